@@ -1,0 +1,96 @@
+"""What a caller may catch: every error of this package derives from :class:`CbrrtError`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+class CbrrtError(Exception):
+    """Base of all errors that this package raises on purpose."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One mistake in an input.
+
+    Attributes:
+        field: dotted path of the value inside its file or call, such as ``robot.limits.v``.
+        value: what was found there.
+        expected: what should have been there.
+    """
+
+    field: str
+    value: object
+    expected: str
+
+    def __str__(self) -> str:
+        """One line: field, value, expectation."""
+        shown = "missing" if self.value is MISSING else f"got {_short(self.value)}"
+        where = f"{self.field}: " if self.field else ""
+        return f"{where}{shown}, expected {self.expected}"
+
+
+class _Missing:
+    """Marks a value that is not there, so that None can be reported as a value."""
+
+    def __repr__(self) -> str:
+        return "nothing"
+
+
+MISSING = _Missing()
+
+
+class InputError(CbrrtError, ValueError):
+    """Input that cannot be used: a file, or the arguments of a call.
+
+    Attributes:
+        problems: every mistake that was found, in the order of the input.
+        source: the file (or call) that holds them.
+    """
+
+    def __init__(self, problems: Problem | Sequence[Problem], source: str = "") -> None:
+        """Report one mistake or several, each on a line of its own."""
+        self.problems = [problems] if isinstance(problems, Problem) else list(problems)
+        self.source = source
+        super().__init__("\n".join(f"{source}: {p}" if source else str(p) for p in self.problems))
+
+
+class WorldError(InputError):
+    """An obstacle, a bound or a footprint that describes no solid."""
+
+
+class RobotError(InputError):
+    """A limit, a gain or a footprint that no robot can have."""
+
+
+class SettingsError(InputError):
+    """A planning setting or a goal that makes no sense."""
+
+
+class ScenarioError(InputError):
+    """A scenario that cannot be planned in, or a scenario file that cannot be read."""
+
+
+class TrajectoryError(InputError):
+    """A trajectory file that cannot be read, or arrays that are no trajectory."""
+
+
+class UnknownPlannerError(InputError):
+    """A planner name that is not known.
+
+    Attributes:
+        name: the name that came.
+        known: the names that are known, sorted.
+    """
+
+    def __init__(self, name: str, known: Sequence[str]) -> None:
+        """Report the unknown name together with the known ones."""
+        self.name, self.known = name, sorted(known)
+        super().__init__(Problem("planner", name, f"one of {', '.join(self.known)}"))
+
+
+def _short(value: object, limit: int = 60) -> str:
+    """Text of a value that fits into one line."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= limit else text[: limit - 3] + "..."

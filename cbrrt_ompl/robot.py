@@ -1,0 +1,231 @@
+"""What the robot is and can do: velocity limits, controller gains and footprint."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+
+from cbrrt_ompl.errors import Problem, RobotError, WorldError
+
+
+class Limits(NamedTuple):
+    """Velocity ranges and the largest accelerations; the defaults are the paper's Tetra-DS II.
+
+    A named tuple, since the compiled kernels take it as it is; :class:`Robot` checks it.
+    """
+
+    v_min: float = 0.0
+    """Smallest forward velocity [m/s]; negative where the robot may reverse."""
+    v_max: float = 1.0
+    """Largest forward velocity [m/s]."""
+    omega_min: float = -math.radians(30.0)
+    """Smallest turning rate [rad/s]."""
+    omega_max: float = math.radians(30.0)
+    """Largest turning rate [rad/s]."""
+    acceleration: float = 0.6
+    """Largest change of v [m/s^2]."""
+    angular_acceleration: float = math.radians(30.0)
+    """Largest change of omega [rad/s^2]."""
+
+    def problems(self) -> list[Problem]:
+        """What is wrong with these limits, one entry a mistake."""
+        found = [
+            Problem(f"limits.{name}", value, "a finite number")
+            for name, value in zip(self._fields, self, strict=True)
+            if not math.isfinite(value)
+        ]
+        if found:
+            return found
+        for name, low, high in (("v", self.v_min, self.v_max), ("omega", self.omega_min, self.omega_max)):
+            if not low <= 0.0 < high:
+                found.append(Problem(f"limits.{name}", [low, high], "a range [low, high] with low <= 0 < high"))
+        for name in ("acceleration", "angular_acceleration"):
+            if getattr(self, name) <= 0.0:
+                found.append(Problem(f"limits.{name}", getattr(self, name), "a number above 0"))
+        return found
+
+
+class Gains(NamedTuple):
+    """Gains of the Kanayama law, Eq. (2) of the paper; the defaults are the paper's."""
+
+    k_x: float = 1.5
+    """Gain on the error ahead [1/s]."""
+    k_y: float = 0.5
+    """Gain on the error to the left [rad/m^2]."""
+    k_theta: float = 0.1
+    """Gain on the heading error [rad/m]."""
+
+    def problems(self) -> list[Problem]:
+        """What is wrong with these gains, one entry a mistake."""
+        return [
+            Problem(f"gains.{name}", value, "a finite number, 0 or more")
+            for name, value in zip(self._fields, self, strict=True)
+            if not (math.isfinite(value) and value >= 0.0)
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class Footprint:
+    """The area that the robot covers, in its own frame; make one by ``point``, ``disc`` or ``polygon``.
+
+    Attributes:
+        radius: radius of a disc about the robot's origin [m]; 0 for a point and for a polygon.
+        vertices: corners of a simple polygon, counter-clockwise, shape (n, 2) [m]; None for a point or a disc.
+    """
+
+    radius: float = 0.0
+    vertices: NDArray[np.float64] | None = None
+
+    @classmethod
+    def point(cls) -> Footprint:
+        """A robot of no size: planning in configuration space, as in the paper."""
+        return cls()
+
+    @classmethod
+    def disc(cls, radius: float) -> Footprint:
+        """A round robot.
+
+        Args:
+            radius: radius about the robot's origin [m], 0 or more.
+
+        Raises:
+            RobotError: if the radius is negative or not finite.
+        """
+        return cls(radius=radius)
+
+    @classmethod
+    def polygon(cls, vertices: ArrayLike) -> Footprint:
+        """A robot with corners.
+
+        Args:
+            vertices: corners in the robot's frame in either direction of turn, shape (n, 2) [m]; convex or not.
+
+        Raises:
+            RobotError: if the corners do not make a simple polygon with an area.
+        """
+        return cls(vertices=np.asarray(vertices, dtype=float))
+
+    def __post_init__(self) -> None:
+        """Check the shape, turn it counter-clockwise and freeze it."""
+        if not (math.isfinite(self.radius) and self.radius >= 0.0):
+            raise RobotError(Problem("footprint.radius", self.radius, "a radius of 0 or more [m]"))
+        if self.vertices is None:
+            return
+        try:
+            corners = counter_clockwise_ring(self.vertices, "footprint.vertices")
+        except WorldError as error:
+            raise RobotError(error.problems) from None
+        object.__setattr__(self, "vertices", corners)
+
+    def __eq__(self, other: object) -> bool:
+        """Equal where the shapes are equal number for number."""
+        if not isinstance(other, Footprint):
+            return NotImplemented
+        return self._key() == other._key()
+
+    def __hash__(self) -> int:
+        """Hash of the shape."""
+        return hash(self._key())
+
+    def _key(self) -> tuple[float, bytes]:
+        return self.radius, b"" if self.vertices is None else self.vertices.tobytes()
+
+    @property
+    def kind(self) -> str:
+        """``point``, ``disc`` or ``polygon``."""
+        if self.vertices is not None:
+            return "polygon"
+        return "disc" if self.radius > 0.0 else "point"
+
+    @property
+    def is_round(self) -> bool:
+        """Whether the heading makes no difference to the area covered."""
+        return self.vertices is None
+
+    @property
+    def inscribed_radius(self) -> float:
+        """Radius of the largest disc about the robot's origin inside the footprint [m]; 0 if the origin is outside."""
+        if self.vertices is None:
+            return self.radius
+        shape, origin = shapely.Polygon(self.vertices), shapely.Point(0.0, 0.0)
+        return float(shapely.distance(shape.exterior, origin)) if shape.contains(origin) else 0.0
+
+    @property
+    def circumscribed_radius(self) -> float:
+        """Radius of the smallest disc about the robot's origin that holds the footprint [m]."""
+        if self.vertices is None:
+            return self.radius
+        return float(np.hypot(*self.vertices.T).max())
+
+    def outline_at(self, pose: ArrayLike, segments: int = 64) -> NDArray[np.float64]:
+        """Border of the footprint at a pose.
+
+        Args:
+            pose: (x, y, theta) of the robot in the world, [m, m, rad].
+            segments: corners that stand for a disc.
+
+        Returns:
+            Corners in the world, shape (n, 2) [m].
+        """
+        x, y, theta = np.asarray(pose, dtype=float)[:3]
+        if self.vertices is None:
+            angles = np.linspace(0.0, 2.0 * np.pi, segments, endpoint=False)
+            return np.array([x, y]) + self.radius * np.column_stack([np.cos(angles), np.sin(angles)])  # (segments, 2)
+        world_from_robot = np.array([[np.cos(theta), -np.sin(theta)], [np.sin(theta), np.cos(theta)]])
+        return np.array([x, y]) + self.vertices @ world_from_robot.T  # (n, 2)
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A two-wheeled robot; the defaults are the paper's (a point with the limits and gains of Tetra-DS II).
+
+    Raises:
+        RobotError: with every limit and gain that is wrong.
+    """
+
+    footprint: Footprint = Footprint()
+    limits: Limits = Limits()
+    gains: Gains = Gains()
+
+    def __post_init__(self) -> None:
+        """Check limits and gains together."""
+        problems = self.limits.problems() + self.gains.problems()
+        if problems:
+            raise RobotError([Problem(f"robot.{p.field}", p.value, p.expected) for p in problems])
+
+
+def counter_clockwise_ring(vertices: ArrayLike, field: str) -> NDArray[np.float64]:
+    """Corners of a simple polygon, checked and ordered.
+
+    Args:
+        vertices: corners, shape (n, 2) [m], open or closed, in either direction.
+        field: name of the value in messages.
+
+    Returns:
+        Corners counter-clockwise, not closed, read-only, shape (n, 2) [m].
+
+    Raises:
+        WorldError: if they are not finite, fewer than three, or make no simple polygon with an area.
+    """
+    try:
+        corners = np.array(vertices, dtype=float)
+    except (TypeError, ValueError):
+        corners = np.empty(0)
+    if corners.ndim != 2 or corners.shape[1] != 2 or not np.isfinite(corners).all():
+        raise WorldError(Problem(field, vertices, "a list of [x, y] corners with finite numbers"))
+    if len(corners) > 1 and np.array_equal(corners[0], corners[-1]):
+        corners = corners[:-1]
+    if len(corners) < 3:
+        raise WorldError(Problem(field, vertices, "at least three corners"))
+    polygon = shapely.Polygon(corners)
+    if not polygon.is_valid or polygon.area <= 0.0:
+        reason = shapely.is_valid_reason(polygon) if not polygon.is_valid else "no area"
+        raise WorldError(Problem(field, vertices, f"a simple polygon with an area ({reason.lower()})"))
+    ring = corners if polygon.exterior.is_ccw else corners[::-1].copy()
+    ring.setflags(write=False)
+    return ring

@@ -1,0 +1,161 @@
+"""What to plan for and how: the goal region and the settings of Algorithms I and II."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from cbrrt_ompl.errors import Problem, SettingsError
+from cbrrt_ompl.robot import Limits
+
+CUT_EXTENSION = ("discard", "keep")
+"""What may become of an extension that meets an obstacle before its horizon."""
+
+
+class State(NamedTuple):
+    """A state of SE(2) x R^2, of start poses and of trajectories alike."""
+
+    x: float
+    """Position [m]."""
+    y: float
+    """Position [m]."""
+    theta: float = 0.0
+    """Heading, counter-clockwise from the x axis [rad]."""
+    v: float = 0.0
+    """Forward velocity [m/s]."""
+    omega: float = 0.0
+    """Turning rate [rad/s]."""
+
+
+@dataclass(frozen=True)
+class Goal:
+    """The goal region: a disc in (x, y), with the heading and the speed restricted on request.
+
+    A state is in it where its distance to (x, y) is below ``tolerance`` (as in OMPL, strictly), the heading is at
+    most ``heading_tolerance`` away from ``theta``, and neither \\|v\\| [m/s] nor \\|omega\\| [rad/s] is above
+    ``speed_tolerance``.
+
+    Raises:
+        SettingsError: with every value that makes no sense.
+    """
+
+    x: float
+    """Centre [m]."""
+    y: float
+    """Centre [m]."""
+    tolerance: float = 0.5
+    """Radius of the disc [m]."""
+    theta: float | None = None
+    """Heading to arrive in [rad]; None leaves it free."""
+    heading_tolerance: float = math.radians(10.0)
+    """Largest deviation from ``theta`` [rad]; without meaning where ``theta`` is None."""
+    speed_tolerance: float | None = None
+    """Largest \\|v\\| [m/s] and \\|omega\\| [rad/s] to arrive with; None leaves them free."""
+
+    def __post_init__(self) -> None:
+        """Check all values together."""
+        problems = [
+            Problem(f"goal.{name}", getattr(self, name), "a finite number")
+            for name in ("x", "y", "theta")
+            if getattr(self, name) is not None and not math.isfinite(getattr(self, name))
+        ]
+        for name in ("tolerance", "heading_tolerance", "speed_tolerance"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0.0):
+                problems.append(Problem(f"goal.{name}", value, "a number above 0"))
+        if problems:
+            raise SettingsError(problems)
+
+    @property
+    def is_position_only(self) -> bool:
+        """Whether heading and speed are both free, as in the paper."""
+        return self.theta is None and self.speed_tolerance is None
+
+    def violations(self, state: State) -> list[str]:
+        """What keeps a state out of the goal region; empty where the state is inside.
+
+        Args:
+            state: the state to judge.
+
+        Returns:
+            A line a violated condition, with the figure and the tolerance.
+        """
+        found = []
+        distance = math.hypot(state.x - self.x, state.y - self.y)
+        if not distance < self.tolerance:
+            found.append(f"{distance:.6g} m from the goal, tolerance {self.tolerance:g} m")
+        if self.theta is not None:
+            error = abs(math.remainder(state.theta - self.theta, math.tau))
+            if error > self.heading_tolerance:
+                found.append(f"heading off by {error:.6g} rad, tolerance {self.heading_tolerance:g} rad")
+        if self.speed_tolerance is not None:
+            for name, speed, unit in (("v", state.v, "m/s"), ("omega", state.omega, "rad/s")):
+                if abs(speed) > self.speed_tolerance:
+                    found.append(f"arrives with {name} = {speed:.6g} {unit}, tolerance {self.speed_tolerance:g}")
+        return found
+
+
+@dataclass(frozen=True)
+class PlanningSettings:
+    """Settings of both planners; the defaults are our readings of the paper.
+
+    Raises:
+        SettingsError: with every value that makes no sense.
+    """
+
+    horizon: float = 2.0
+    """Duration t_h of one extension [s]."""
+    step: float = 0.05
+    """Integration step dt, and the spacing of the checked states [s]."""
+    goal_bias: float = 0.0
+    """Share of samples that are the goal itself, 0 to 1."""
+    max_samples: int = 50_000
+    """Samples after which a plan has failed: K of Algorithm I."""
+    cut_extension: str = "discard"
+    """``discard`` or ``keep`` the free part of an extension that meets an obstacle."""
+    equal_control_tolerance: float = 0.1
+    """eps_u of Algorithm II, line 5 [m/s and rad/s]; 0 refuses only an identical control, a negative one nothing."""
+    look_ahead: float | None = None
+    """Largest distance of the reference from its node [m]; None is ``v_max * horizon``."""
+    closed_loop: bool = False
+    """Evaluate the Kanayama law at every step instead of once an extension."""
+
+    def __post_init__(self) -> None:
+        """Check all values together."""
+        problems = [
+            Problem(f"planning.{name}", getattr(self, name), "a number above 0 [s]")
+            for name in ("horizon", "step")
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0)
+        ]
+        if not problems and not 1 <= round(self.horizon / self.step) <= MAX_STEPS:
+            problems.append(
+                Problem("planning.horizon", self.horizon, f"1 to {MAX_STEPS} steps of {self.step:g} s (planning.step)")
+            )
+        if not 0.0 <= self.goal_bias <= 1.0:
+            problems.append(Problem("planning.goal_bias", self.goal_bias, "a number from 0 to 1"))
+        if not (isinstance(self.max_samples, int) and self.max_samples >= 1):
+            problems.append(Problem("planning.max_samples", self.max_samples, "a whole number of 1 or more"))
+        if self.cut_extension not in CUT_EXTENSION:
+            problems.append(Problem("planning.cut_extension", self.cut_extension, f"one of {', '.join(CUT_EXTENSION)}"))
+        if not math.isfinite(self.equal_control_tolerance):
+            problems.append(
+                Problem("planning.equal_control_tolerance", self.equal_control_tolerance, "a finite number")
+            )
+        if self.look_ahead is not None and not (math.isfinite(self.look_ahead) and self.look_ahead > 0.0):
+            problems.append(Problem("planning.look_ahead", self.look_ahead, "a number above 0 [m]"))
+        if problems:
+            raise SettingsError(problems)
+
+    @property
+    def steps(self) -> int:
+        """Integration steps of a whole extension."""
+        return round(self.horizon / self.step)
+
+    def reference_distance(self, limits: Limits) -> float:
+        """Largest distance of the reference from its node for a robot [m]."""
+        return limits.v_max * self.horizon if self.look_ahead is None else self.look_ahead
+
+
+MAX_STEPS = 100_000
+"""Steps that one extension may have: what a control duration and its buffers are made for."""

@@ -1,0 +1,389 @@
+"""Where the robot may be: bounds and obstacles as FCL solids.
+
+The plane is the plane z = 0 of FCL's space. A disc becomes a sphere, a box a tall box, a polygon its flat triangles,
+each centred on that plane, so that every answer in the plane is FCL's answer in space. FCL answers in closed form where
+one shape is a sphere, and else by GJK, to well below the micrometre of `CONTACT_TOLERANCE`. (Flat triangles on purpose:
+between `fcl.Convex` and `fcl.BVHModel`, FCL 0.7 overestimates distances by decimetres.)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, TypeAlias
+
+import fcl
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+
+from cbrrt_ompl.errors import Problem, WorldError
+from cbrrt_ompl.robot import Footprint, counter_clockwise_ring
+
+CONTACT_TOLERANCE = 1e-6
+"""Every footprint is grown by this much, so that touching counts as collision whatever the rounding [m]."""
+
+_ZERO_DISTANCE = 1e-12
+"""Distances up to this are contact: where shapes overlap, FCL returns 0, -1 or a denormal number [m]."""
+
+MAX_COORDINATE = 1e6
+"""Largest coordinate of a world [m]: beyond it the contact tolerance would drown in rounding."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """The rectangle that the whole footprint must stay in; its sides are walls.
+
+    Raises:
+        WorldError: if a corner is not finite or the rectangle has no area.
+    """
+
+    min: tuple[float, float]
+    """Lower left corner [m]."""
+    max: tuple[float, float]
+    """Upper right corner [m]."""
+
+    def __post_init__(self) -> None:
+        """Check the corners."""
+        problems = _rectangle_problems("bounds", self.min, self.max)
+        if problems:
+            raise WorldError(problems)
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height [m]."""
+        return self.max[0] - self.min[0], self.max[1] - self.min[1]
+
+    def contains(self, x: float, y: float) -> bool:
+        """Whether a point lies strictly inside."""
+        return self.min[0] < x < self.max[0] and self.min[1] < y < self.max[1]
+
+    def walls(self) -> list[Box]:
+        """Four solid walls around the rectangle, as thick as it is wide."""
+        (x0, y0), (x1, y1) = self.min, self.max
+        d = max(self.size)
+        return [
+            Box((x0 - d, y0 - d), (x0, y1 + d)),
+            Box((x1, y0 - d), (x1 + d, y1 + d)),
+            Box((x0 - d, y0 - d), (x1 + d, y0)),
+            Box((x0 - d, y1), (x1 + d, y1 + d)),
+        ]
+
+
+@dataclass(frozen=True)
+class Box:
+    """A solid rectangle along the axes.
+
+    Raises:
+        WorldError: if a corner is not finite or the rectangle has no area.
+    """
+
+    min: tuple[float, float]
+    """Lower left corner [m]."""
+    max: tuple[float, float]
+    """Upper right corner [m]."""
+
+    def __post_init__(self) -> None:
+        """Check the corners."""
+        problems = _rectangle_problems("box", self.min, self.max)
+        if problems:
+            raise WorldError(problems)
+
+    def to_shapely(self) -> shapely.Polygon:
+        """The same area as a shapely polygon."""
+        return shapely.box(*self.min, *self.max)
+
+
+@dataclass(frozen=True)
+class Disc:
+    """A solid disc.
+
+    Raises:
+        WorldError: if the centre is not finite or the radius not above 0.
+    """
+
+    center: tuple[float, float]
+    """Centre [m]."""
+    radius: float
+    """Radius [m]."""
+
+    def __post_init__(self) -> None:
+        """Check centre and radius."""
+        problems = []
+        if not all(_is_coordinate(c) for c in self.center):
+            problems.append(Problem("disc.center", self.center, _COORDINATES))
+        if not (0.0 < self.radius <= MAX_COORDINATE):
+            problems.append(Problem("disc.radius", self.radius, "a radius above 0 [m]"))
+        if problems:
+            raise WorldError(problems)
+
+    def to_shapely(self) -> shapely.Polygon:
+        """The disc as a shapely polygon of 256 sides."""
+        return shapely.Point(self.center).buffer(self.radius, quad_segs=64)
+
+
+@dataclass(frozen=True, eq=False)
+class Polygon:
+    """A solid simple polygon, convex or not, with holes if need be.
+
+    Raises:
+        WorldError: if the rings cross themselves or each other, or enclose no area.
+    """
+
+    vertices: NDArray[np.float64]
+    """Corners, counter-clockwise, shape (n, 2) [m]."""
+    holes: tuple[NDArray[np.float64], ...] = ()
+    """Rings that are cut out, each of shape (m, 2) [m]."""
+
+    def __post_init__(self) -> None:
+        """Check and freeze the rings."""
+        object.__setattr__(self, "vertices", counter_clockwise_ring(self.vertices, "polygon.vertices"))
+        holes = tuple(counter_clockwise_ring(h, f"polygon.holes[{i}]") for i, h in enumerate(self.holes))
+        object.__setattr__(self, "holes", holes)
+        if float(np.abs(self.vertices).max()) > MAX_COORDINATE:
+            raise WorldError(Problem("polygon.vertices", self.vertices.tolist(), _COORDINATES))
+        shape = self.to_shapely()
+        if not shape.is_valid:
+            reason = shapely.is_valid_reason(shape).lower()
+            raise WorldError(Problem("polygon.holes", len(holes), f"holes apart from each other and inside ({reason})"))
+
+    def __eq__(self, other: object) -> bool:
+        """Equal where all rings are, corner for corner."""
+        if not isinstance(other, Polygon):
+            return NotImplemented
+        mine, theirs = (self.vertices, *self.holes), (other.vertices, *other.holes)
+        return len(mine) == len(theirs) and all(np.array_equal(a, b) for a, b in zip(mine, theirs, strict=True))
+
+    def __hash__(self) -> int:
+        """Hash of the outer ring."""
+        return hash(self.vertices.tobytes())
+
+    def to_shapely(self) -> shapely.Polygon:
+        """The same area as a shapely polygon."""
+        return shapely.Polygon(self.vertices, self.holes)
+
+
+Obstacle: TypeAlias = Box | Disc | Polygon
+"""What may stand in a world."""
+
+
+class World:
+    """Bounds and obstacles, ready for collision queries.
+
+    Attributes:
+        bounds: the walls around everything.
+        obstacles: the solids inside, in the order given; they may overlap.
+    """
+
+    def __init__(self, bounds: Bounds, obstacles: Iterable[Obstacle] = ()) -> None:
+        """Build the FCL solids and their broad-phase tree.
+
+        Args:
+            bounds: the walls.
+            obstacles: boxes, discs and polygons, any number.
+        """
+        self.bounds = bounds
+        self.obstacles: tuple[Obstacle, ...] = tuple(obstacles)
+        height = 4.0 * (max(bounds.size) + max((_extent(o) for o in self.obstacles), default=0.0))
+        solids: list[Obstacle] = [*bounds.walls(), *self.obstacles]
+        self._solids = _manager([_solid(o, height) for o in solids])
+        self._boundaries = [(o, _boundary(o, height)) for o in self.obstacles if isinstance(o, Polygon)]
+
+    def collides(self, footprint: Footprint, pose: ArrayLike) -> bool:
+        """Whether a footprint at a pose touches an obstacle or a wall: FCL's answer.
+
+        Args:
+            footprint: the robot's area.
+            pose: (x, y, theta), [m, m, rad].
+
+        Returns:
+            True where it touches, and wherever the robot's origin is not strictly inside the bounds.
+        """
+        x, y, theta = (float(value) for value in np.asarray(pose, dtype=float)[:3])
+        return self.checker(footprint).collides(x, y, theta)
+
+    def clearance(self, footprint: Footprint, pose: ArrayLike) -> float:
+        """Distance of a footprint from the nearest obstacle or wall: FCL's answer.
+
+        Args:
+            footprint: the robot's area.
+            pose: (x, y, theta), [m, m, rad].
+
+        Returns:
+            The distance [m]; 0 where they touch or overlap.
+        """
+        x, y, theta = (float(value) for value in np.asarray(pose, dtype=float)[:3])
+        return self.checker(footprint).clearance(x, y, theta)
+
+    def signed_clearance(self, x: float, y: float) -> float:
+        """Distance of a point from the nearest solid, or minus a depth below its surface: FCL's answers.
+
+        Inside overlapping solids the depth is that below one of them, so a lower bound: every point nearer than that
+        is in collision as well.
+
+        Args:
+            x: position [m].
+            y: position [m].
+
+        Returns:
+            Signed distance [m]; never less certain than a rounding error.
+        """
+        return self.checker(Footprint.point()).signed_clearance(x, y)
+
+    def checker(self, footprint: Footprint) -> CollisionChecker:
+        """The checker for one footprint, made once and kept."""
+        return _checker(self, footprint)
+
+
+class CollisionChecker:
+    """Asks FCL about one footprint in one world; its FCL objects are moved, so each thread needs its own.
+
+    Attributes:
+        queries: how often FCL was asked.
+    """
+
+    def __init__(self, world: World, footprint: Footprint) -> None:
+        """Make the FCL objects of the footprint."""
+        self.queries = 0
+        self._bounds = world.bounds
+        self._solids = world._solids
+        self._boundaries = world._boundaries
+        self._grown = fcl.CollisionObject(_footprint_geometry(footprint, CONTACT_TOLERANCE))
+        self._exact = fcl.CollisionObject(_footprint_geometry(footprint, 0.0))
+        self._translation = np.zeros(3)
+        self._rotation = np.eye(3)
+        self._is_round = footprint.is_round
+
+    def _move(self, footprint: Any, x: float, y: float, theta: float) -> None:
+        """Place an FCL object of the footprint at a pose in the plane z = 0."""
+        self._translation[0], self._translation[1] = x, y
+        if not self._is_round:
+            c, s = math.cos(theta), math.sin(theta)
+            r = self._rotation
+            r[0, 0], r[0, 1], r[1, 0], r[1, 1] = c, -s, s, c
+        footprint.setTransform(fcl.Transform(self._rotation, self._translation))
+
+    def collides(self, x: float, y: float, theta: float) -> bool:
+        """Whether the footprint touches a solid at this pose [m, m, rad]."""
+        if not self._bounds.contains(x, y):  # also what NaN and infinity come to
+            return True
+        self.queries += 1
+        self._move(self._grown, x, y, theta)
+        data = fcl.CollisionData()
+        self._solids.collide(self._grown, data, fcl.defaultCollisionCallback)
+        return bool(data.result.is_collision)
+
+    def _distance(self) -> float:
+        """FCL's distance of the exact footprint, as it stands, from the nearest solid [m]."""
+        data = fcl.DistanceData()
+        self._solids.distance(self._exact, data, fcl.defaultDistanceCallback)
+        return float(data.result.min_distance)
+
+    def clearance(self, x: float, y: float, theta: float) -> float:
+        """Distance to the nearest solid [m] at this pose [m, m, rad]; 0 where it touches or is out of bounds."""
+        if self.collides(x, y, theta):
+            return 0.0
+        self.queries += 1
+        self._move(self._exact, x, y, theta)
+        return max(self._distance(), 0.0)
+
+    def signed_clearance(self, x: float, y: float) -> float:
+        """Signed distance of the robot's origin [m]; see :meth:`World.signed_clearance`."""
+        self.queries += 1
+        point = self._exact
+        self._move(point, x, y, 0.0)
+        distance = self._distance()
+        if distance > _ZERO_DISTANCE:
+            return distance
+        contacts = fcl.CollisionData(request=fcl.CollisionRequest(num_max_contacts=64, enable_contact=True))
+        self._solids.collide(point, contacts, fcl.defaultCollisionCallback)
+        touched = contacts.result.contacts
+        depth = max((c.penetration_depth for c in touched if not isinstance(c.o1, fcl.BVHModel)), default=0.0)
+        here = shapely.Point(x, y)
+        for polygon, boundary in self._boundaries:
+            if polygon.to_shapely().contains(here):
+                depth = max(depth, fcl.distance(point, boundary))
+        return -float(depth)
+
+
+@lru_cache(maxsize=32)
+def _checker(world: World, footprint: Footprint) -> CollisionChecker:
+    return CollisionChecker(world, footprint)
+
+
+_COORDINATES = f"finite coordinates of at most {MAX_COORDINATE:g} m"
+
+
+def _is_coordinate(value: float) -> bool:
+    return abs(value) <= MAX_COORDINATE  # False for NaN
+
+
+def _rectangle_problems(name: str, low: Sequence[float], high: Sequence[float]) -> list[Problem]:
+    """What is wrong with the rectangle from low to high."""
+    if not all(_is_coordinate(c) for c in (*low, *high)):
+        return [Problem(name, [list(low), list(high)], _COORDINATES)]
+    if not (low[0] < high[0] and low[1] < high[1]):
+        return [Problem(name, [list(low), list(high)], "min below max in x and in y")]
+    return []
+
+
+def _extent(obstacle: Obstacle) -> float:
+    """Longer side of the rectangle around an obstacle [m]."""
+    x0, y0, x1, y1 = obstacle.to_shapely().bounds
+    return max(x1 - x0, y1 - y0)
+
+
+def _manager(objects: list[Any]) -> Any:
+    """A broad-phase tree over FCL objects."""
+    manager = fcl.DynamicAABBTreeCollisionManager()
+    manager.registerObjects(objects)
+    manager.setup()
+    return manager
+
+
+def _solid(obstacle: Obstacle, height: float) -> Any:
+    """FCL object of an obstacle."""
+    if isinstance(obstacle, Box):
+        (x0, y0), (x1, y1) = obstacle.min, obstacle.max
+        place = fcl.Transform(np.array([0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.0]))
+        return fcl.CollisionObject(fcl.Box(x1 - x0, y1 - y0, height), place)
+    if isinstance(obstacle, Disc):
+        place = fcl.Transform(np.array([*obstacle.center, 0.0]))
+        return fcl.CollisionObject(fcl.Sphere(obstacle.radius), place)
+    return fcl.CollisionObject(_flat_mesh(obstacle.to_shapely()))
+
+
+def _boundary(polygon: Polygon, height: float) -> Any:
+    """FCL object of a polygon's border alone: an upright wall of no thickness along every edge."""
+    faces = []
+    for ring in (polygon.vertices, *polygon.holes):
+        for (ax, ay), (bx, by) in zip(ring, np.roll(ring, -1, axis=0), strict=True):
+            low_a, low_b, high_a, high_b = ((x, y, z) for z in (-height, height) for x, y in ((ax, ay), (bx, by)))
+            faces += [low_a, low_b, high_b, low_a, high_b, high_a]
+    return fcl.CollisionObject(_mesh(np.array(faces)))
+
+
+def _mesh(corners: NDArray[np.float64]) -> Any:
+    """FCL mesh of triangles given by their corners, shape (3 m, 3)."""
+    mesh = fcl.BVHModel()
+    mesh.beginModel(len(corners), len(corners) // 3)
+    mesh.addSubModel(corners, np.arange(len(corners)).reshape(-1, 3))
+    mesh.endModel()
+    return mesh
+
+
+def _flat_mesh(polygon: shapely.Polygon) -> Any:
+    """FCL mesh of a polygon's triangles in the plane z = 0."""
+    triangles = shapely.constrained_delaunay_triangles(polygon).geoms
+    corners = np.concatenate([np.asarray(t.exterior.coords)[:3] for t in triangles])  # (3 m, 2)
+    return _mesh(np.column_stack([corners, np.zeros(len(corners))]))
+
+
+def _footprint_geometry(footprint: Footprint, growth: float) -> Any:
+    """FCL geometry of a footprint in the robot's frame, grown by some metres."""
+    if footprint.vertices is None:
+        return fcl.Sphere(footprint.radius + growth)
+    polygon = shapely.Polygon(footprint.vertices)
+    return _flat_mesh(polygon.buffer(growth, join_style="mitre") if growth > 0.0 else polygon)
