@@ -1,0 +1,35 @@
+# Needs Python 3.10, 3.11 or 3.12 with venv, and nothing else: everything goes into .venv.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+.PHONY: help demo test clean
+help:
+	@echo "make demo   install into $(VENV) and run both planners of the paper on its two scenes"
+	@echo "make test   install into $(VENV) and run every check: ruff, mypy, import-linter, pytest"
+	@echo "make clean  remove $(VENV), demo/ and all caches"
+
+demo: $(VENV)/demo.stamp
+	$(BIN)/cbrrt demo --output demo
+
+test: $(VENV)/test.stamp
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/python -m pytest -n 2
+
+$(VENV)/demo.stamp: EXTRA :=
+$(VENV)/test.stamp: EXTRA := [test]
+$(VENV)/%.stamp: pyproject.toml Makefile
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 10) <= sys.version_info < (3, 13))' || { \
+		echo "error: '$(PYTHON)' is not Python 3.10, 3.11 or 3.12; name one: make PYTHON=python3.12" >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
+		echo "error: '$(PYTHON)' has no venv; on Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.$(EXTRA)'
+	@touch $@
+
+clean:
+	rm -rf $(VENV) demo build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	find cbrrt_ompl tests -type d -name __pycache__ -prune -exec rm -rf {} +
