@@ -1,0 +1,81 @@
+"""CB-RRT and S-RRT, trajectory planners for two-wheeled robots, inside OMPL's ``control::RRT``.
+
+The names below are looked up when they are first used, so that importing the package costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from cbrrt_ompl.errors import CbrrtError, InputError
+    from cbrrt_ompl.ompl_plugin.setup import make_setup
+    from cbrrt_ompl.planning import PlanResult, plan
+    from cbrrt_ompl.robot import Footprint, Gains, Limits, Robot
+    from cbrrt_ompl.scenario import Scenario, load_scenario, save_scenario
+    from cbrrt_ompl.settings import Goal, PlanningSettings, State
+    from cbrrt_ompl.trajectory import Trajectory
+    from cbrrt_ompl.verification import verify
+    from cbrrt_ompl.world import Bounds, Box, Disc, Polygon, World
+
+    __version__: str
+
+__all__ = [
+    "Bounds",
+    "Box",
+    "CbrrtError",
+    "Disc",
+    "Footprint",
+    "Gains",
+    "Goal",
+    "InputError",
+    "Limits",
+    "PlanResult",
+    "PlanningSettings",
+    "Polygon",
+    "Robot",
+    "Scenario",
+    "State",
+    "Trajectory",
+    "World",
+    "__version__",
+    "load_scenario",
+    "make_setup",
+    "plan",
+    "save_scenario",
+    "verify",
+]
+
+_MODULES = {
+    "errors": ("CbrrtError", "InputError"),
+    "ompl_plugin.setup": ("make_setup",),
+    "planning": ("PlanResult", "plan"),
+    "robot": ("Footprint", "Gains", "Limits", "Robot"),
+    "scenario": ("Scenario", "load_scenario", "save_scenario"),
+    "settings": ("Goal", "PlanningSettings", "State"),
+    "trajectory": ("Trajectory",),
+    "verification": ("verify",),
+    "world": ("Bounds", "Box", "Disc", "Polygon", "World"),
+}
+_HOME = {name: module for module, names in _MODULES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    """Look a public name up in the module that defines it, once."""
+    value: object
+    if name == "__version__":
+        from importlib.metadata import version
+
+        value = version("cbrrt-ompl")
+    elif name in _HOME:
+        value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """The public names, whether looked up already or not."""
+    return sorted({*globals(), *__all__})

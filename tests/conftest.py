@@ -1,0 +1,23 @@
+"""What all tests share. The kernels are compiled once a machine: numba caches them beside the modules."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+settings.register_profile("repeatable", derandomize=True, deadline=None)
+settings.load_profile("repeatable")
+
+
+@pytest.fixture(scope="session")
+def repository() -> Path:
+    """The folder that holds README.md, scenarios/ and the package."""
+    return Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="session")
+def scenarios(repository: Path) -> Path:
+    """The folder of scenario files."""
+    return repository / "scenarios"
