@@ -1,0 +1,228 @@
+"""FCL's answers, certified and stored: a quadtree that decides states in compiled code.
+
+The distance of a point from the nearest solid is 1-Lipschitz. If FCL says that the centre q of a cell has clearance c,
+then every position p with \\|p - q\\| < c - r is free for a footprint inside a disc of radius r, and every p with
+\\|p - q\\| < r' - c is in collision for a footprint that holds a disc of radius r' (c is negative below a surface). What
+neither certificate decides is asked: FCL answers with the real footprint, and the cell is split where the question was.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from cbrrt_ompl.robot import Footprint
+from cbrrt_ompl.world import CONTACT_TOLERANCE, MITRE_LIMIT, World
+
+COLLISION = -1.0
+"""Certificate of a position at which the footprint touches something, whatever its heading."""
+
+UNDECIDED = 0.0
+"""Certificate of a position that only FCL can decide."""
+
+CERTIFICATE_MARGIN = 1e-6
+"""What a certificate must hold by [m]: well above the rounding of FCL's closed-form distances and of its GJK."""
+
+SMALLEST_CELL = 0.02
+"""Cells are split down to about this size [m], or to 2^-16 of the world's where that is larger."""
+
+MAX_CELLS = 2_000_000
+"""Cells that a map holds at most: 24 MB."""
+
+
+class MapView(NamedTuple):
+    """The map as the kernels see it."""
+
+    children: NDArray[np.int32]
+    """Index of the first of a cell's four children, 0 at a leaf; empty where there is no map, shape (n,)."""
+    clearances: NDArray[np.float64]
+    """Signed clearance of each cell's centre, shape (n,) [m]."""
+    x_min: float
+    """Bounds of the world [m]."""
+    y_min: float
+    x_max: float
+    y_max: float
+    size: float
+    """Side of the root cell, whose lower left corner is that of the bounds [m]."""
+    inner: float
+    """Radius of a disc about the robot's origin that the grown footprint holds [m]."""
+    outer: float
+    """Radius of a disc about the robot's origin that holds the grown footprint [m]."""
+    is_round: bool
+    """Whether the heading makes no difference."""
+
+
+FRAME_SIZE = len(MapView._fields) - 2
+"""Numbers of a view besides its two arrays."""
+
+
+@njit(cache=True)
+def unpack_view(children: NDArray[np.int32], clearances: NDArray[np.float64], f: NDArray[np.float64]) -> MapView:
+    """The view out of its arrays, f of shape (FRAME_SIZE,)."""
+    return MapView(children, clearances, f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7] != 0.0)
+
+
+@njit(cache=True)
+def find_leaf(view: MapView, x: float, y: float) -> tuple[int, float, float, float]:
+    """The leaf that holds a position inside the bounds.
+
+    Returns:
+        Its index, the centre and the side of its cell [m].
+    """
+    size = view.size
+    x_centre, y_centre = view.x_min + 0.5 * size, view.y_min + 0.5 * size
+    cell = 0
+    while view.children[cell] > 0:
+        cell = view.children[cell]
+        size *= 0.5
+        if x >= x_centre:
+            cell += 1
+            x_centre += 0.5 * size
+        else:
+            x_centre -= 0.5 * size
+        if y >= y_centre:
+            cell += 2
+            y_centre += 0.5 * size
+        else:
+            y_centre -= 0.5 * size
+    return cell, x_centre, y_centre, size
+
+
+@njit(cache=True)
+def certify(view: MapView, x: float, y: float) -> float:
+    """What the map knows about a position.
+
+    Args:
+        view: the map.
+        x: position of the robot's origin [m].
+        y: position of the robot's origin [m].
+
+    Returns:
+        `COLLISION`; or `UNDECIDED`; or a distance [m] within which every position is free, whatever the heading.
+    """
+    if not (view.x_min < x < view.x_max and view.y_min < y < view.y_max):
+        return COLLISION
+    if len(view.children) == 0:
+        return UNDECIDED
+    cell, x_centre, y_centre, _ = find_leaf(view, x, y)
+    clearance = view.clearances[cell]
+    distance = math.sqrt((x - x_centre) * (x - x_centre) + (y - y_centre) * (y - y_centre)) + CERTIFICATE_MARGIN
+    if clearance - view.outer - distance > 0.0:
+        return clearance - view.outer - distance
+    if view.inner - clearance - distance > 0.0:
+        return COLLISION
+    return UNDECIDED
+
+
+class ClearanceMap:
+    """Decides states for one footprint in one world: by certificate where possible, else by FCL.
+
+    The map grows where it is asked, never beyond `MAX_CELLS`; its answers are FCL's whatever it holds.
+
+    Attributes:
+        checker: the FCL queries behind the map.
+        children: see :class:`MapView`; replaced when the map grows.
+        clearances: see :class:`MapView`; replaced when the map grows.
+        frame: the other numbers of the view, shape (FRAME_SIZE,).
+        exact_queries: states that FCL had to decide with the real footprint.
+    """
+
+    def __init__(self, world: World, footprint: Footprint, *, enabled: bool = True) -> None:
+        """Start with the root cell alone.
+
+        Args:
+            world: bounds and obstacles.
+            footprint: the robot's area.
+            enabled: False leaves the map empty, so that FCL decides every state inside the bounds.
+        """
+        self.checker = world.checker(footprint)
+        self.enabled = enabled
+        self.exact_queries = 0
+        self._signed_clearance = world.checker(Footprint.point()).signed_clearance
+        bounds = world.bounds
+        size = max(bounds.size)
+        self._smallest = max(SMALLEST_CELL, size / 2**16)
+        inner = footprint.inscribed_radius + (CONTACT_TOLERANCE if footprint.is_round else 0.0)
+        outer = footprint.circumscribed_radius + MITRE_LIMIT * CONTACT_TOLERANCE
+        self.frame = np.array([*bounds.min, *bounds.max, size, inner, outer, footprint.is_round], dtype=float)
+        self._cells = 1 if enabled else 0
+        self.children = np.zeros(self._cells, dtype=np.int32)
+        self.clearances = np.zeros(self._cells)
+        if enabled:
+            x, y = bounds.min[0] + 0.5 * size, bounds.min[1] + 0.5 * size
+            self.clearances[0] = self._signed_clearance(x, y)
+
+    @property
+    def view(self) -> MapView:
+        """The map for a kernel, as it is now."""
+        f = self.frame
+        numbers = (float(value) for value in f[:7])
+        return MapView(self.children, self.clearances, *numbers, is_round=bool(f[7]))
+
+    @property
+    def cells(self) -> int:
+        """Cells in the map."""
+        return self._cells
+
+    def collides(self, x: float, y: float, theta: float) -> bool:
+        """Whether the footprint touches an obstacle or a wall at a pose [m, m, rad]: always FCL's answer.
+
+        Where the map does not know yet, it is refined on the way.
+        """
+        certificate = certify_packed(self.children, self.clearances, self.frame, x, y)
+        if certificate == UNDECIDED and self._refine(x, y):
+            certificate = certify_packed(self.children, self.clearances, self.frame, x, y)
+        if certificate == UNDECIDED:
+            self.exact_queries += 1
+            return self.checker.collides(x, y, theta)
+        return bool(certificate == COLLISION)
+
+    def _refine(self, x: float, y: float) -> bool:
+        """Split the cells at an undecided position until it is decided; False where nothing could be split."""
+        has_grown = False
+        while self._cells + 4 <= MAX_CELLS and self.enabled:
+            view = self.view
+            cell, x_centre, y_centre, size = find_leaf(view, x, y)
+            if size <= self._smallest:
+                break
+            self._split(cell, x_centre, y_centre, 0.25 * size)
+            has_grown = True
+            if certify_packed(self.children, self.clearances, self.frame, x, y) != UNDECIDED:
+                break
+        return has_grown
+
+    def _split(self, cell: int, x: float, y: float, offset: float) -> None:
+        """Give a leaf its four children, whose centres FCL measures."""
+        first = self._cells
+        if first + 4 > len(self.children):
+            capacity = min(2 * len(self.children) + 64, MAX_CELLS + 4)
+            self.children = np.concatenate([self.children, np.zeros(capacity - first, dtype=np.int32)])
+            self.clearances = np.concatenate([self.clearances, np.zeros(capacity - first)])
+        for i, (dx, dy) in enumerate(((-1, -1), (1, -1), (-1, 1), (1, 1))):
+            self.clearances[first + i] = self._signed_clearance(x + dx * offset, y + dy * offset)
+        self._cells += 4
+        self.children[cell] = first  # last, so that no reader ever meets a child without its clearance
+
+
+_maps: WeakKeyDictionary[World, dict[Footprint, ClearanceMap]] = WeakKeyDictionary()
+
+
+def clearance_map_for(world: World, footprint: Footprint) -> ClearanceMap:
+    """The map of a footprint in a world: made once, grown by every plan, and kept as long as the world."""
+    maps = _maps.setdefault(world, {})
+    if footprint not in maps:
+        maps[footprint] = ClearanceMap(world, footprint)
+    return maps[footprint]
+
+
+@njit(cache=True)
+def certify_packed(
+    children: NDArray[np.int32], clearances: NDArray[np.float64], frame: NDArray[np.float64], x: float, y: float
+) -> float:
+    """:func:`certify` for a caller in Python, to whom arrays cost less than a named tuple."""
+    return certify(unpack_view(children, clearances, frame), x, y)

@@ -1,0 +1,341 @@
+"""Compiled EXTEND_TRAJECTORY of the paper (Algorithm II), for the plugin and the compiled planners alike.
+
+An extension decides states by the clearance map. Where the map cannot, the kernel does not guess: it returns `ASK` with
+the steps in question, the caller lets FCL answer them and calls again with the answers, and the extension is repeated.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from cbrrt_ompl.clearance_map import COLLISION, UNDECIDED, MapView, certify
+from cbrrt_ompl.control_laws import reference_pose, steering_rate, tracking_command
+from cbrrt_ompl.errors import Problem, SettingsError
+from cbrrt_ompl.kinematics import dynamic_step, kinematic_step
+from cbrrt_ompl.robot import Gains, Limits, Robot
+from cbrrt_ompl.settings import Goal, PlanningSettings
+
+OPEN_LOOP, CLOSED_LOOP, STEERING = 0, 1, 2
+"""How an extension is driven: Kanayama law once an extension or at every step (CB-RRT), or at full speed (S-RRT)."""
+
+EXTENDED, REFUSED, BLOCKED, ASK = 0, 1, 2, 3
+"""What came of an extension: a new node, line 5 of Algorithm II, an obstacle, or a question to FCL."""
+
+UNKNOWN, FREE, HIT = 0, 1, 2
+"""FCL's answer about a step: not asked yet, free, in collision."""
+
+CANDIDATES = 3
+"""Extensions tried for one sample at most: the three steering rates of S-RRT."""
+
+
+class GoalRegion(NamedTuple):
+    """The goal as the kernels see it; infinite tolerances leave a condition out."""
+
+    x: float
+    y: float
+    tolerance: float
+    theta: float
+    heading_tolerance: float
+    speed_tolerance: float
+
+
+class Model(NamedTuple):
+    """All that an extension depends on besides node, sample and world."""
+
+    law: int
+    """`OPEN_LOOP`, `CLOSED_LOOP` or `STEERING`."""
+    dt: float
+    """Integration step [s]."""
+    steps: int
+    """Steps of a whole extension."""
+    look_ahead: float
+    """Largest distance of the reference from its node [m]."""
+    equal_control_tolerance: float
+    """eps_u of line 5 [m/s and rad/s]."""
+    keep_cut: bool
+    """Whether the free part of an extension that meets an obstacle is kept."""
+    limits: Limits
+    gains: Gains
+    goal: GoalRegion
+
+
+MODEL_SIZE = 6 + len(Limits._fields) + len(Gains._fields) + len(GoalRegion._fields)
+"""Numbers in a packed model."""
+
+
+def pack_model(law: int, robot: Robot, goal: Goal, planning: PlanningSettings) -> NDArray[np.float64]:
+    """The model as one flat array: what a kernel takes from Python at the least cost.
+
+    Args:
+        law: `OPEN_LOOP`, `CLOSED_LOOP` or `STEERING`.
+        robot: limits and gains.
+        goal: goal region.
+        planning: settings.
+
+    Returns:
+        The numbers that :func:`unpack_model` reads, shape (MODEL_SIZE,).
+    """
+    region = GoalRegion(
+        goal.x,
+        goal.y,
+        goal.tolerance,
+        0.0 if goal.theta is None else goal.theta,
+        math.inf if goal.theta is None else goal.heading_tolerance,
+        math.inf if goal.speed_tolerance is None else goal.speed_tolerance,
+    )
+    head = (
+        law,
+        planning.step,
+        planning.steps,
+        planning.reference_distance(robot.limits),
+        planning.equal_control_tolerance,
+        planning.cut_extension == "keep",
+    )
+    return np.array([*head, *robot.limits, *robot.gains, *region], dtype=float)
+
+
+@njit(cache=True)
+def unpack_model(p: NDArray[np.float64]) -> Model:
+    """The model out of its flat array, shape (MODEL_SIZE,)."""
+    return Model(
+        int(p[0]),
+        p[1],
+        int(p[2]),
+        p[3],
+        p[4],
+        p[5] != 0.0,
+        Limits(p[6], p[7], p[8], p[9], p[10], p[11]),
+        Gains(p[12], p[13], p[14]),
+        GoalRegion(p[15], p[16], p[17], p[18], p[19], p[20]),
+    )
+
+
+@njit(cache=True)
+def in_goal(goal: GoalRegion, x: float, y: float, theta: float, v: float, omega: float) -> bool:
+    """Whether a state satisfies the goal; the distance is compared as OMPL's GoalState does, bit for bit."""
+    dx, dy = x - goal.x, y - goal.y
+    if not math.sqrt(dx * dx + dy * dy) < goal.tolerance:
+        return False
+    if goal.heading_tolerance < math.inf:
+        error = abs(theta - goal.theta) % (2.0 * math.pi)
+        if min(error, 2.0 * math.pi - error) > goal.heading_tolerance:
+            return False
+    return abs(v) <= goal.speed_tolerance and abs(omega) <= goal.speed_tolerance
+
+
+@njit(cache=True)
+def advance(
+    x: float,
+    y: float,
+    theta: float,
+    v: float,
+    omega: float,
+    control: tuple[float, float, float],
+    model: Model,
+    dt: float,
+) -> tuple[float, float, float, float, float, float, float]:
+    """One integration step under a control.
+
+    Args:
+        x: position [m].
+        y: position [m].
+        theta: heading [rad].
+        v: forward velocity [m/s].
+        omega: turning rate [rad/s].
+        control: command (v, omega, unused), or the reference pose (x_r, y_r, theta_r) where the law is `CLOSED_LOOP`.
+        model: how the robot moves.
+        dt: duration of the step [s].
+
+    Returns:
+        (x, y, theta, v, omega) one step later, and the command (v, omega) of the step.
+    """
+    if model.law == STEERING:
+        command = (control[0], control[1])
+        x, y, theta, v, omega = kinematic_step(x, y, theta, command, dt)
+        return x, y, theta, v, omega, command[0], command[1]
+    if model.law == CLOSED_LOOP:
+        command = tracking_command(x, y, theta, control, model.limits, model.gains)
+    else:
+        command = (control[0], control[1])
+    x, y, theta, v, omega = dynamic_step(x, y, theta, v, omega, command, model.limits, dt)
+    return x, y, theta, v, omega, command[0], command[1]
+
+
+@njit(cache=True)
+def roll_out(
+    states: NDArray[np.float64],
+    control: tuple[float, float, float],
+    model: Model,
+    view: MapView,
+    answers: NDArray[np.int8],
+    questions: NDArray[np.int64],
+) -> tuple[int, bool, int]:
+    """Drive from a valid state under one control until the horizon, the goal or an obstacle.
+
+    Args:
+        states: row 0 holds the start; the others are filled, shape (steps + 1, 5).
+        control: see :func:`advance`.
+        model: how the robot moves.
+        view: the clearance map.
+        answers: FCL's answers by step, `UNKNOWN` where it was not asked, shape (steps + 1,).
+        questions: takes the steps that FCL must decide, shape (steps + 1,).
+
+    Returns:
+        The last step taken to be free, whether an obstacle ended the way there, and the number of questions.
+    """
+    x, y, theta, v, omega = states[0, 0], states[0, 1], states[0, 2], states[0, 3], states[0, 4]
+    margin = 0.0  # every position nearer than this to the present one is certified free
+    asked = 0
+    for k in range(1, model.steps + 1):
+        x_before, y_before, v_before = x, y, v
+        x, y, theta, v, omega, _, _ = advance(x, y, theta, v, omega, control, model, model.dt)
+        moved = x != x_before or y != y_before
+        if moved or not view.is_round:
+            margin -= max(abs(v), abs(v_before)) * model.dt
+            if margin <= 0.0:
+                margin = certify(view, x, y)
+            if margin == COLLISION:
+                return k - 1, True, asked
+            if margin == UNDECIDED:
+                if answers[k] == HIT:
+                    return k - 1, True, asked
+                if answers[k] == UNKNOWN:
+                    questions[asked] = k
+                    asked += 1
+        states[k, 0], states[k, 1], states[k, 2], states[k, 3], states[k, 4] = x, y, theta, v, omega
+        if in_goal(model.goal, x, y, theta, v, omega):
+            return k, False, asked
+    return model.steps, False, asked
+
+
+@njit(cache=True)
+def is_refused(
+    first: int,
+    following: NDArray[np.int32],
+    commands: NDArray[np.float64],
+    v: float,
+    omega: float,
+    tolerance: float,
+) -> bool:
+    """Line 5 of Algorithm II: whether a node has a child by (nearly) the same command.
+
+    Args:
+        first: index of the node's latest child, -1 if it has none.
+        following: the next older sibling of each child, -1 at the end.
+        commands: command (v, omega) that made each child, shape (n, 2), [m/s, rad/s].
+        v: forward velocity of the new command [m/s].
+        omega: turning rate of the new command [rad/s].
+        tolerance: eps_u [m/s and rad/s].
+    """
+    child = first
+    while child >= 0:
+        if abs(commands[child, 0] - v) <= tolerance and abs(commands[child, 1] - omega) <= tolerance:
+            return True
+        child = following[child]
+    return False
+
+
+@njit(cache=True)
+def candidate(
+    index: int, node: NDArray[np.float64], reference: tuple[float, float, float], model: Model
+) -> tuple[float, float, tuple[float, float, float]]:
+    """A command worth trying from a node, and the control that carries it out.
+
+    Args:
+        index: 0 for CB-RRT; 0, 1, 2 for the steering rates of S-RRT.
+        node: state of the node, shape (5,).
+        reference: pose to drive to, [m, m, rad].
+        model: how the robot moves.
+
+    Returns:
+        The command (v, omega) that line 5 compares, and the control for :func:`advance`.
+    """
+    if model.law == STEERING:
+        v, omega = model.limits.v_max, steering_rate(index, model.limits)
+        return v, omega, (v, omega, 0.0)
+    v, omega = tracking_command(node[0], node[1], node[2], reference, model.limits, model.gains)
+    if model.law == CLOSED_LOOP:
+        return v, omega, reference
+    return v, omega, (v, omega, 0.0)
+
+
+@njit(cache=True)
+def extend(
+    states: NDArray[np.float64],
+    x_sample: float,
+    y_sample: float,
+    first: int,
+    following: NDArray[np.int32],
+    commands: NDArray[np.float64],
+    model: Model,
+    view: MapView,
+    answers: NDArray[np.int8],
+    questions: NDArray[np.int64],
+) -> tuple[int, int, int, float, float, tuple[float, float, float]]:
+    """EXTEND_TRAJECTORY of the paper: from a node towards a sample.
+
+    CB-RRT has one candidate. S-RRT tries its three steering rates, leaves out those that the node has used or that
+    collide, and takes the one that ends nearest to the reference.
+
+    Args:
+        states: the first row holds the node; a block a candidate is filled, shape (CANDIDATES, steps + 1, 5).
+        x_sample: the sample [m].
+        y_sample: the sample [m].
+        first: latest child of the node, see :func:`is_refused`.
+        following: next older sibling of each child.
+        commands: command of each child, shape (n, 2).
+        model: all settings.
+        view: the clearance map.
+        answers: FCL's answers by candidate and step, shape (CANDIDATES, steps + 1).
+        questions: takes the steps that FCL must decide, shape (steps + 1,).
+
+    Returns:
+        What came of it (`EXTENDED`, `REFUSED`, `BLOCKED` or `ASK`), the candidate chosen or in question, its number of
+        steps or of questions, its command (v, omega) and its control.
+    """
+    node = states[0, 0]
+    reference = reference_pose(node[0], node[1], node[2], x_sample, y_sample, model.look_ahead)
+    result, chosen, count = REFUSED, 0, 0
+    v_chosen, omega_chosen, control_chosen = 0.0, 0.0, (0.0, 0.0, 0.0)
+    nearest = math.inf
+    for c in range(CANDIDATES if model.law == STEERING else 1):
+        v, omega, control = candidate(c, node, reference, model)
+        if is_refused(first, following, commands, v, omega, model.equal_control_tolerance):
+            continue
+        for i in range(5):
+            states[c, 0, i] = node[i]
+        last, is_cut, asked = roll_out(states[c], control, model, view, answers[c], questions)
+        if last == 0 or (is_cut and not model.keep_cut):
+            if result == REFUSED:
+                result = BLOCKED
+            continue
+        dx, dy = states[c, last, 0] - reference[0], states[c, last, 1] - reference[1]
+        distance = dx * dx + dy * dy
+        if asked > 0 and (model.keep_cut or distance < nearest):
+            return ASK, c, asked, v, omega, control
+        if distance < nearest:
+            nearest = distance
+            result, chosen, count = EXTENDED, c, last
+            v_chosen, omega_chosen, control_chosen = v, omega, control
+    return result, chosen, count, v_chosen, omega_chosen, control_chosen
+
+
+def check_step(robot: Robot, planning: PlanningSettings) -> None:
+    """Refuse a step that is too long for the integrator.
+
+    Raises:
+        SettingsError: if the robot can turn by more than half a radian in one step.
+    """
+    fastest = max(-robot.limits.omega_min, robot.limits.omega_max)
+    if fastest * planning.step > MAX_TURN_PER_STEP:
+        expected = f"at most {MAX_TURN_PER_STEP / fastest:.3g} s for a robot that turns at {fastest:.3g} rad/s"
+        raise SettingsError(Problem("planning.step", planning.step, expected))
+
+
+MAX_TURN_PER_STEP = 0.5
+"""Largest turn in one integration step [rad]: the error of a step then stays below 1e-5 of its length."""

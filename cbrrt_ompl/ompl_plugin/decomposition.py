@@ -1,0 +1,34 @@
+"""The workspace grid that OMPL's Syclop planners search first."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from cbrrt_ompl.ompl_plugin.binding import ob, oc
+from cbrrt_ompl.world import Bounds
+
+CELLS_PER_SIDE = 32
+"""Cells of the grid along each axis, as in OMPL's own Syclop demo."""
+
+
+class PositionDecomposition(oc.GridDecomposition):  # type: ignore[misc]  # OMPL has no type information
+    """A grid over (x, y)."""
+
+    def __init__(self, bounds: Bounds) -> None:
+        """Lay the grid over the bounds."""
+        limits = ob.RealVectorBounds(2)
+        for i in range(2):
+            limits.setLow(i, bounds.min[i])
+            limits.setHigh(i, bounds.max[i])
+        super().__init__(CELLS_PER_SIDE, 2, limits)
+
+    def project(self, state: Any, coord: Any) -> None:
+        """Position of a state."""
+        position = state[0]
+        coord[0], coord[1] = position[0], position[1]
+
+    def sampleFullState(self, sampler: Any, coord: Any, state: Any) -> None:  # noqa: N802  # OMPL's name
+        """A random state at a given position."""
+        sampler.sampleUniform(state)
+        position = state[0]
+        position[0], position[1] = coord[0], coord[1]

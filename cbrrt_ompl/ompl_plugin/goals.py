@@ -1,0 +1,80 @@
+"""Goal regions as OMPL's goals: exact where the kernels and OMPL must agree."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from cbrrt_ompl.ompl_plugin.binding import ob
+from cbrrt_ompl.ompl_plugin.reals import StateReals
+from cbrrt_ompl.ompl_plugin.space import STATE_DIMENSION, set_state
+from cbrrt_ompl.settings import Goal, State
+
+_JUST_BELOW_ONE = math.nextafter(1.0, 0.0)
+
+
+def make_goal(si: Any, space: Any, goal: Goal) -> Any:
+    """The goal region for OMPL.
+
+    A goal in position alone is OMPL's own `GoalState`: its distance is the space's, which is position-only.
+
+    Args:
+        si: the space information.
+        space: its state space.
+        goal: the region.
+    """
+    if not goal.is_position_only:
+        return PoseGoal(si, space, goal)
+    region = ob.GoalState(si)
+    centre = ob.State(space)
+    set_state(centre(), centre_state(goal))
+    region.setState(centre())
+    region.setThreshold(goal.tolerance)
+    return region
+
+
+def centre_state(goal: Goal) -> State:
+    """The state in the middle of a goal region, at rest."""
+    return State(goal.x, goal.y, goal.theta or 0.0)
+
+
+class PoseGoal(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no type information
+    """A goal region that also restricts the heading, the speed or both.
+
+    OMPL calls a state satisfied where ``distanceGoal`` is below the threshold of 1: it is the largest of the
+    deviations, each divided by its tolerance.
+    """
+
+    def __init__(self, si: Any, space: Any, goal: Goal) -> None:
+        """Keep the region.
+
+        Args:
+            si: the space information.
+            space: its state space.
+            goal: the region.
+        """
+        super().__init__(si)
+        self.setThreshold(1.0)
+        self._goal = goal
+        self._reals = StateReals(space, STATE_DIMENSION)
+
+    def distanceGoal(self, state: Any) -> float:  # noqa: N802  # OMPL's name
+        """The largest deviation in units of its tolerance; below 1 exactly where the goal is satisfied."""
+        self._reals.read(state)
+        values = State(*self._reals.values.tolist())
+        goal = self._goal
+        deviations = [math.hypot(values.x - goal.x, values.y - goal.y) / goal.tolerance]
+        if goal.theta is not None:
+            deviations.append(abs(math.remainder(values.theta - goal.theta, math.tau)) / goal.heading_tolerance)
+        if goal.speed_tolerance is not None:
+            deviations.append(max(abs(values.v), abs(values.omega)) / goal.speed_tolerance)
+        farthest = max(deviations)
+        return max(farthest, 1.0) if goal.violations(values) else min(farthest, _JUST_BELOW_ONE)
+
+    def sampleGoal(self, state: Any) -> None:  # noqa: N802  # OMPL's name
+        """The middle of the region, at rest."""
+        set_state(state, centre_state(self._goal))
+
+    def maxSampleCount(self) -> int:  # noqa: N802  # OMPL's name
+        """One: the middle."""
+        return 1

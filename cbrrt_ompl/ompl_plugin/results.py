@@ -1,0 +1,65 @@
+"""What OMPL found, in this package's terms: paths as trajectories, planner data as trees."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cbrrt_ompl.extension import CLOSED_LOOP
+from cbrrt_ompl.ompl_plugin.binding import oc, ou
+from cbrrt_ompl.replay import trajectory_from_controls, tree_from_controls
+from cbrrt_ompl.trajectory import Trajectory
+from cbrrt_ompl.tree import Tree
+
+
+def trajectory_from_path(path: Any, space: Any, model: NDArray[np.float64]) -> Trajectory:
+    """A control path, replayed on the integration grid.
+
+    Args:
+        path: an ``ompl.control.PathControl`` of at least one state.
+        space: its state space.
+        model: packed model that its controls were made for.
+    """
+    count = path.getControlCount()
+    controls = np.array([_control(path.getControl(i), model) for i in range(count)]).reshape(count, 3)
+    durations = np.array([path.getControlDuration(i) for i in range(count)])
+    steps = np.rint(durations / model[1]).astype(np.int64)
+    return trajectory_from_controls(_reals(space, path.getState(0)), controls, steps, model)
+
+
+def tree_from_planner(planner: Any, si: Any, space: Any, model: NDArray[np.float64]) -> Tree:
+    """The tree that a planner holds, with the way along every edge.
+
+    Args:
+        planner: a planner of OMPL after ``solve``.
+        si: its space information.
+        space: its state space.
+        model: packed model that its controls were made for.
+    """
+    data = oc.PlannerData(si)
+    planner.getPlannerData(data)
+    n = data.numVertices()
+    states = np.array([_reals(space, data.getVertex(i).getState()) for i in range(n)]).reshape(n, 5)
+    parents = np.full(n, -1, dtype=np.int64)
+    controls, steps = np.zeros((n, 3)), np.zeros(n, dtype=np.int64)
+    children = ou.vectorUint()
+    for parent in range(n):
+        data.getEdges(parent, children)
+        for child in children:
+            edge = data.getEdge(parent, child)
+            parents[child] = parent
+            controls[child] = _control(edge.getControl(), model)
+            steps[child] = round(edge.getDuration() / model[1])
+    return tree_from_controls(states, parents, controls, steps, model)
+
+
+def _reals(space: Any, state: Any) -> NDArray[np.float64]:
+    reals = ou.vectorDouble()
+    space.copyToReals(reals, state)
+    return np.array(list(reals))  # (5,)
+
+
+def _control(control: Any, model: NDArray[np.float64]) -> tuple[float, float, float]:
+    return control[0], control[1], control[2] if int(model[0]) == CLOSED_LOOP else 0.0

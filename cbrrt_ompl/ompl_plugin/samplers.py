@@ -1,0 +1,181 @@
+"""Directed control samplers: a whole extension of CB-RRT or S-RRT behind one call of OMPL's control::RRT."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from cbrrt_ompl.clearance_map import ClearanceMap, unpack_view
+from cbrrt_ompl.extension import (
+    ASK,
+    CANDIDATES,
+    CLOSED_LOOP,
+    EXTENDED,
+    FREE,
+    HIT,
+    REFUSED,
+    UNKNOWN,
+    extend,
+    unpack_model,
+)
+from cbrrt_ompl.ompl_plugin.binding import oc
+from cbrrt_ompl.ompl_plugin.reals import StateReals
+from cbrrt_ompl.ompl_plugin.space import STATE_DIMENSION
+
+
+class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL has no type information
+    """Extends a node of control::RRT towards a sample, by Algorithm II of the paper.
+
+    Contract with OMPL: ``source`` is the node and is only read; ``dest`` holds the sample and, where the extension
+    succeeds, takes the state at its end; ``control`` takes the control. The result is the number of propagation steps,
+    or 0 where nothing is to be added. The way is checked for collision here and nowhere else; it ends early at the
+    first state in the goal region. OMPL makes one sampler a tree, so the sampler remembers the children of its nodes.
+
+    Attributes:
+        samples: calls so far.
+        refused: calls refused by line 5 of Algorithm II.
+    """
+
+    def __init__(self, si: Any, space: Any, model: NDArray[np.float64], clearance_map: ClearanceMap) -> None:
+        """Make the buffers.
+
+        Args:
+            si: the space information that allocates this sampler.
+            space: its state space. (References to ``si`` itself would make a cycle that Python cannot see.)
+            model: packed model, see :func:`cbrrt_ompl.extension.pack_model`.
+            clearance_map: decides the states.
+        """
+        super().__init__(si)
+        self.samples = 0
+        self.refused = 0
+        self._node, self._sample = StateReals(space, STATE_DIMENSION), StateReals(space, STATE_DIMENSION)
+        self._model, self._map = model, clearance_map
+        unpacked = unpack_model.py_func(model)
+        self._control_dimension = 3 if unpacked.law == CLOSED_LOOP else 2
+        self._states = np.empty((CANDIDATES, unpacked.steps + 1, STATE_DIMENSION))
+        self._answers = np.full((CANDIDATES, unpacked.steps + 1), UNKNOWN, dtype=np.int8)
+        self._questions = np.empty(unpacked.steps + 1, dtype=np.int64)
+        self._outcome = np.empty(OUTCOME_SIZE)
+        self._first_child: dict[bytes, int] = {}
+        self._following = np.empty(64, dtype=np.int32)
+        self._commands = np.empty((64, 2))
+        self._children = 0
+
+    def sampleTo(self, control: Any, *states: Any) -> int:  # noqa: N802  # OMPL's name
+        """Extend ``states[-2]`` towards ``states[-1]``; OMPL may pass the node's control before them."""
+        source, dest = states[-2:]
+        self.samples += 1
+        self._node.read(source)
+        self._sample.read(dest)
+        node = self._node.values.tobytes()
+        status = self._extend(self._first_child.get(node, -1))
+        if status == ASK:
+            status = self._ask_and_extend(self._first_child.get(node, -1))
+        if status != EXTENDED:
+            self.refused += status == REFUSED
+            return 0
+        outcome = self._outcome.tolist()
+        self._remember(node, outcome[2], outcome[3])
+        for i in range(self._control_dimension):
+            control[i] = outcome[4 + i]
+        self._sample.write(dest)
+        return int(outcome[1])
+
+    def _extend(self, first: int) -> int:
+        """Run the kernel on the present node and sample."""
+        m = self._map
+        return extend_packed(
+            self._node.values,
+            self._sample.values,
+            first,
+            self._following,
+            self._commands,
+            self._model,
+            m.children,
+            m.clearances,
+            m.frame,
+            self._states,
+            self._answers,
+            self._questions,
+            self._outcome,
+        )
+
+    def _ask_and_extend(self, first: int) -> int:
+        """Answer the kernel's questions by FCL until it has none."""
+        status = ASK
+        while status == ASK:
+            c, asked = int(self._outcome[0]), int(self._outcome[1])
+            for k in self._questions[:asked].tolist():
+                x, y, theta = self._states[c, k, :3].tolist()
+                hit = self._map.collides(x, y, theta)
+                self._answers[c, k] = HIT if hit else FREE
+                if hit:
+                    break
+            status = self._extend(first)
+        self._answers.fill(UNKNOWN)
+        return status
+
+    def _remember(self, node: bytes, v: float, omega: float) -> None:
+        """Note the command of a new child, for line 5 of Algorithm II."""
+        child = self._children
+        if child == len(self._following):
+            self._following = np.concatenate([self._following, np.empty_like(self._following)])
+            self._commands = np.concatenate([self._commands, np.empty_like(self._commands)])
+        self._following[child] = self._first_child.get(node, -1)
+        self._commands[child] = v, omega
+        self._first_child[node] = child
+        self._children = child + 1
+
+
+class KanayamaDirectedControlSampler(ExtensionSampler):
+    """CB-RRT: the Kanayama law under acceleration limits, once an extension or in closed loop (as the model says)."""
+
+
+class SteeringDirectedControlSampler(ExtensionSampler):
+    """S-RRT: full speed at the best of three steering rates."""
+
+
+OUTCOME_SIZE = 7
+"""Numbers of an outcome: candidate, steps (or questions), command (2), control (3)."""
+
+
+@njit(cache=True)
+def extend_packed(
+    node: NDArray[np.float64],
+    sample: NDArray[np.float64],
+    first: int,
+    following: NDArray[np.int32],
+    commands: NDArray[np.float64],
+    model: NDArray[np.float64],
+    children: NDArray[np.int32],
+    clearances: NDArray[np.float64],
+    frame: NDArray[np.float64],
+    states: NDArray[np.float64],
+    answers: NDArray[np.int8],
+    questions: NDArray[np.int64],
+    outcome: NDArray[np.float64],
+) -> int:
+    """:func:`cbrrt_ompl.extension.extend` for a caller in Python: flat arrays in, outcome and last state out."""
+    for i in range(len(node)):
+        states[0, 0, i] = node[i]
+    status, chosen, count, v, omega, control = extend(
+        states,
+        sample[0],
+        sample[1],
+        first,
+        following,
+        commands,
+        unpack_model(model),
+        unpack_view(children, clearances, frame),
+        answers,
+        questions,
+    )
+    outcome[0], outcome[1], outcome[2], outcome[3] = chosen, count, v, omega
+    outcome[4], outcome[5], outcome[6] = control
+    if status == EXTENDED:
+        for i in range(len(sample)):
+            sample[i] = states[chosen, count, i]
+    return status

@@ -1,0 +1,170 @@
+"""make_setup: a scenario as an ordinary ``ompl.control.SimpleSetup``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cbrrt_ompl.clearance_map import ClearanceMap
+from cbrrt_ompl.errors import UnknownPlannerError
+from cbrrt_ompl.extension import CLOSED_LOOP, OPEN_LOOP, STEERING, check_step, pack_model
+from cbrrt_ompl.ompl_plugin.binding import ob, oc
+from cbrrt_ompl.ompl_plugin.decomposition import PositionDecomposition
+from cbrrt_ompl.ompl_plugin.goals import make_goal
+from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
+from cbrrt_ompl.ompl_plugin.samplers import (
+    ExtensionSampler,
+    KanayamaDirectedControlSampler,
+    SteeringDirectedControlSampler,
+)
+from cbrrt_ompl.ompl_plugin.space import make_control_space, make_reference_space, make_state_space, set_state
+from cbrrt_ompl.ompl_plugin.validity import FclStateValidityChecker
+from cbrrt_ompl.scenario import Scenario
+
+SAMPLERS: dict[str, type[ExtensionSampler]] = {
+    "cb-rrt": KanayamaDirectedControlSampler,
+    "s-rrt": SteeringDirectedControlSampler,
+}
+"""Planners of the paper: control::RRT with a directed sampler of ours."""
+
+
+OMPL_PLANNERS: dict[str, Callable[[Any, Scenario], Any]] = {
+    "rrt": lambda si, _: oc.RRT(si),
+    "kpiece1": lambda si, _: oc.KPIECE1(si),
+    "est": lambda si, _: oc.EST(si),
+    "sst": lambda si, _: oc.SST(si),
+    "pdst": lambda si, _: oc.PDST(si),
+    "syclop-rrt": lambda si, s: oc.SyclopRRT(si, PositionDecomposition(s.world.bounds)),
+    "syclop-est": lambda si, s: oc.SyclopEST(si, PositionDecomposition(s.world.bounds)),
+}
+"""OMPL's own planners, with their own samplers and settings, on the dynamic motion model."""
+
+
+def law_of(planner: str, scenario: Scenario) -> int:
+    """How a planner drives: `STEERING`, `CLOSED_LOOP` or `OPEN_LOOP`."""
+    if planner == "s-rrt":
+        return STEERING
+    return CLOSED_LOOP if planner == "cb-rrt" and scenario.planning.closed_loop else OPEN_LOOP
+
+
+@dataclass
+class Equipment:
+    """What one planner was given: its model, its map and, once it has begun, its sampler.
+
+    Attributes:
+        model: packed model, see :func:`cbrrt_ompl.extension.pack_model`.
+        clearance_map: decides its states.
+        sampler: the sampler allocated last; None for OMPL's own planners.
+    """
+
+    model: NDArray[np.float64]
+    clearance_map: ClearanceMap
+    sampler: ExtensionSampler | None = None
+
+
+def make_setup(scenario: Scenario, planner: str = "cb-rrt") -> Any:
+    """A scenario as an ordinary ``ompl.control.SimpleSetup``, ready for ``solve``.
+
+    Args:
+        scenario: world, robot, start, goal and settings.
+        planner: `cb-rrt`, `s-rrt`, or a planner of OMPL: `rrt`, `kpiece1`, `est`, `sst`, `pdst`, `syclop-rrt`,
+            `syclop-est`.
+
+    Returns:
+        The set-up with state space, validity checker, propagator, start, goal and planner. Its limits are OMPL's: pass
+        ``solve`` a time or a termination condition; ``max_samples`` is a matter of :func:`cbrrt_ompl.plan`.
+
+    Raises:
+        UnknownPlannerError: if there is no such planner.
+        SettingsError: if the step is too long for the robot.
+    """
+    return make_equipped_setup(scenario, planner)[0]
+
+
+def make_equipped_setup(
+    scenario: Scenario, planner: str = "cb-rrt", clearance_map: ClearanceMap | None = None
+) -> tuple[Any, Equipment]:
+    """:func:`make_setup` together with what the planner was given.
+
+    Args:
+        scenario: world, robot, start, goal and settings.
+        planner: see :func:`make_setup`.
+        clearance_map: map of the scenario's world and footprint; a new one if None.
+    """
+    if planner not in SAMPLERS and planner not in OMPL_PLANNERS:
+        raise UnknownPlannerError(planner, [*SAMPLERS, *OMPL_PLANNERS])
+    check_step(scenario.robot, scenario.planning)
+    limits, bounds = scenario.robot.limits, scenario.world.bounds
+    space = make_state_space(bounds, limits)
+    if law_of(planner, scenario) == CLOSED_LOOP:
+        setup = oc.SimpleSetup(make_reference_space(space, bounds))
+    else:
+        setup = oc.SimpleSetup(make_control_space(space, limits))
+    si = setup.getSpaceInformation()
+    si.setPropagationStepSize(scenario.planning.step)
+    si.setMinMaxControlDuration(1, scenario.planning.steps)
+    clearance_map = clearance_map or ClearanceMap(scenario.world, scenario.robot.footprint)
+    setup.setStateValidityChecker(FclStateValidityChecker(si, space, clearance_map))
+    start = ob.State(space)
+    set_state(start(), scenario.start)
+    setup.setStartState(start)
+    setup.setGoal(make_goal(si, space, scenario.goal))
+    equipment = equip(si, space, scenario, planner, clearance_map)
+    setup.setPlanner(make_planner(si, scenario, planner))
+    if planner == "sst":
+        setup.setOptimizationObjective(first_solution_objective(si))
+    return setup, equipment
+
+
+def equip(si: Any, space: Any, scenario: Scenario, planner: str, clearance_map: ClearanceMap) -> Equipment:
+    """Give a space information the propagator and the directed sampler of one planner, and take away all others.
+
+    Args:
+        si: the space information that the planner will use.
+        space: its state space.
+        scenario: robot, goal and settings.
+        planner: a known planner's name.
+        clearance_map: decides the states.
+    """
+    equipment = Equipment(
+        pack_model(law_of(planner, scenario), scenario.robot, scenario.goal, scenario.planning), clearance_map
+    )
+    si.setStatePropagator(TwoWheelPropagator(si, space, equipment.model))
+    si.clearDirectedSamplerAllocator()
+    if planner in SAMPLERS:
+        sampler_class = SAMPLERS[planner]
+
+        def allocate(owner: Any) -> ExtensionSampler:
+            equipment.sampler = sampler_class(owner, space, equipment.model, clearance_map)
+            return equipment.sampler
+
+        si.setDirectedControlSamplerAllocator(oc.DirectedControlSamplerAllocator(allocate))
+    return equipment
+
+
+def make_planner(si: Any, scenario: Scenario, planner: str) -> Any:
+    """A planner of OMPL under our name; control::RRT for the paper's planners, with the scenario's goal bias.
+
+    Args:
+        si: the equipped space information.
+        scenario: bounds (for Syclop's grid) and goal bias.
+        planner: a known planner's name.
+    """
+    if planner in SAMPLERS:
+        made = oc.RRT(si)
+        made.setGoalBias(scenario.planning.goal_bias)
+    else:
+        made = OMPL_PLANNERS[planner](si, scenario)
+    made.setName(planner)
+    return made
+
+
+def first_solution_objective(si: Any) -> Any:
+    """Path length, any: lets SST end with its first solution, as all the other planners do."""
+    objective = ob.PathLengthOptimizationObjective(si)
+    objective.setCostThreshold(objective.infiniteCost())
+    return objective
