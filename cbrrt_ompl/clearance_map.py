@@ -129,6 +129,7 @@ class ClearanceMap:
         children: see :class:`MapView`; replaced when the map grows.
         clearances: see :class:`MapView`; replaced when the map grows.
         frame: the other numbers of the view, shape (FRAME_SIZE,).
+        answers: FCL's answers of the present extension, rows of (x, y, theta, margin), shape (n, 4).
         exact_queries: states that FCL had to decide with the real footprint.
     """
 
@@ -150,6 +151,7 @@ class ClearanceMap:
         inner = footprint.inscribed_radius + (CONTACT_TOLERANCE if footprint.is_round else 0.0)
         outer = footprint.circumscribed_radius + MITRE_LIMIT * CONTACT_TOLERANCE
         self.frame = np.array([*bounds.min, *bounds.max, size, inner, outer, footprint.is_round], dtype=float)
+        self.answers = np.empty((64, 4))
         self._cells = 1 if enabled else 0
         self.children = np.zeros(self._cells, dtype=np.int32)
         self.clearances = np.zeros(self._cells)
@@ -181,6 +183,26 @@ class ClearanceMap:
             self.exact_queries += 1
             return self.checker.collides(x, y, theta)
         return bool(certificate == COLLISION)
+
+    def answer(self, answered: int, x: float, y: float, theta: float) -> int:
+        """Settle a pose that a kernel asked about: by refining the map, else by a row of ``answers`` from FCL.
+
+        Args:
+            answered: rows of ``answers`` in use.
+            x: position [m].
+            y: position [m].
+            theta: heading [rad].
+
+        Returns:
+            Rows of ``answers`` in use afterwards.
+        """
+        if self._refine(x, y) and certify_packed(self.children, self.clearances, self.frame, x, y) != UNDECIDED:
+            return answered
+        if answered == len(self.answers):
+            self.answers = np.concatenate([self.answers, np.empty_like(self.answers)])
+        self.exact_queries += 1
+        self.answers[answered] = x, y, theta, self.checker.margin(x, y, theta)
+        return answered + 1
 
     def _refine(self, x: float, y: float) -> bool:
         """Split the cells at an undecided position until it is decided; False where nothing could be split."""

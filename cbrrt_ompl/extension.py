@@ -1,7 +1,7 @@
 """Compiled EXTEND_TRAJECTORY of the paper (Algorithm II), for the plugin and the compiled planners alike.
 
-An extension decides states by the clearance map. Where the map cannot, the kernel does not guess: it returns `ASK` with
-the steps in question, the caller lets FCL answer them and calls again with the answers, and the extension is repeated.
+An extension decides poses by the clearance map. Where the map cannot, the kernel does not guess: it returns `ASK` with
+the pose in question, the caller lets FCL answer it and calls again with the answer, and the extension is repeated.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from cbrrt_ompl.clearance_map import COLLISION, UNDECIDED, MapView, certify
 from cbrrt_ompl.control_laws import reference_pose, steering_rate, tracking_command
 from cbrrt_ompl.errors import Problem, SettingsError
-from cbrrt_ompl.kinematics import dynamic_step, kinematic_step
+from cbrrt_ompl.kinematics import dynamic_step, kinematic_step, unicycle_step
 from cbrrt_ompl.robot import Gains, Limits, Robot
 from cbrrt_ompl.settings import Goal, PlanningSettings
 
@@ -26,8 +26,8 @@ OPEN_LOOP, CLOSED_LOOP, STEERING = 0, 1, 2
 EXTENDED, REFUSED, BLOCKED, ASK = 0, 1, 2, 3
 """What came of an extension: a new node, line 5 of Algorithm II, an obstacle, or a question to FCL."""
 
-UNKNOWN, FREE, HIT = 0, 1, 2
-"""FCL's answer about a step: not asked yet, free, in collision."""
+MOTION_RESOLUTION = 2.5e-4
+"""Checks along a motion are at least this far apart [m]: nothing thicker than this is passed through."""
 
 CANDIDATES = 3
 """Extensions tried for one sample at most: the three steering rates of S-RRT."""
@@ -167,50 +167,104 @@ def advance(
 
 
 @njit(cache=True)
+def find_answer(answers: NDArray[np.float64], answered: int, x: float, y: float, theta: float) -> float:
+    """What FCL said about a pose: its margin [m], 0 in collision, -1 where it was not asked.
+
+    Args:
+        answers: rows of (x, y, theta, margin), shape (n, 4).
+        answered: rows in use.
+        x: position [m].
+        y: position [m].
+        theta: heading [rad].
+    """
+    for i in range(answered):
+        if answers[i, 0] == x and answers[i, 1] == y and answers[i, 2] == theta:
+            return answers[i, 3]
+    return -1.0
+
+
+@njit(cache=True)
+def is_doomed(
+    states: NDArray[np.float64], k: int, control: tuple[float, float, float], model: Model, view: MapView
+) -> bool:
+    """Whether the map alone shows that the way on from row k meets an obstacle: then FCL need not be asked."""
+    x, y, theta, v, omega = states[k, 0], states[k, 1], states[k, 2], states[k, 3], states[k, 4]
+    for _ in range(k, model.steps):
+        x, y, theta, v, omega, _, _ = advance(x, y, theta, v, omega, control, model, model.dt)
+        if certify(view, x, y) == COLLISION:
+            return True
+        if in_goal(model.goal, x, y, theta, v, omega):
+            return False
+    return False
+
+
+@njit(cache=True)
 def roll_out(
     states: NDArray[np.float64],
     control: tuple[float, float, float],
     model: Model,
     view: MapView,
-    answers: NDArray[np.int8],
-    questions: NDArray[np.int64],
-) -> tuple[int, bool, int]:
+    answers: NDArray[np.float64],
+    answered: int,
+) -> tuple[int, int, tuple[float, float, float]]:
     """Drive from a valid state under one control until the horizon, the goal or an obstacle.
+
+    The way is checked without gaps: a position with margin m proves the next m metres, and the next check is where the
+    proof ends, be it between two steps. (With a footprint that is not round, an answer of FCL's holds for the heading
+    asked; then turning uses the margin up as well, at the circumscribed radius.) Where the margin is smaller than
+    `MOTION_RESOLUTION`, checks are that far apart.
 
     Args:
         states: row 0 holds the start; the others are filled, shape (steps + 1, 5).
         control: see :func:`advance`.
         model: how the robot moves.
         view: the clearance map.
-        answers: FCL's answers by step, `UNKNOWN` where it was not asked, shape (steps + 1,).
-        questions: takes the steps that FCL must decide, shape (steps + 1,).
+        answers: what FCL has said, see :func:`find_answer`.
+        answered: rows of ``answers`` in use.
 
     Returns:
-        The last step taken to be free, whether an obstacle ended the way there, and the number of questions.
+        The last step known to be free; `EXTENDED`, `BLOCKED` or `ASK`; and the pose that FCL must decide.
     """
     x, y, theta, v, omega = states[0, 0], states[0, 1], states[0, 2], states[0, 3], states[0, 4]
-    margin = 0.0  # every position nearer than this to the present one is certified free
-    asked = 0
+    margin = max(certify(view, x, y), 0.0)
+    spin = 0.0 if view.is_round or margin > 0.0 else view.outer  # margin used up by a turn [m/rad]
     for k in range(1, model.steps + 1):
-        x_before, y_before, v_before = x, y, v
+        x0, y0, theta0, v0, omega0 = x, y, theta, v, omega
         x, y, theta, v, omega, _, _ = advance(x, y, theta, v, omega, control, model, model.dt)
-        moved = x != x_before or y != y_before
-        if moved or not view.is_round:
-            margin -= max(abs(v), abs(v_before)) * model.dt
-            if margin <= 0.0:
-                margin = certify(view, x, y)
-            if margin == COLLISION:
-                return k - 1, True, asked
-            if margin == UNDECIDED:
-                if answers[k] == HIT:
-                    return k - 1, True, asked
-                if answers[k] == UNKNOWN:
-                    questions[asked] = k
-                    asked += 1
+        if model.law == STEERING:
+            v0, omega0 = v, omega
+        travel, turn = max(abs(v0), abs(v)) * model.dt, max(abs(omega0), abs(omega)) * model.dt
+        margin -= travel + spin * turn
+        if margin <= 0.0 and travel + spin * turn > 0.0:
+            margin += travel + spin * turn
+            share = 0.0
+            while share < 1.0:
+                share += max(margin, MOTION_RESOLUTION) / (travel + spin * turn)
+                if share >= 1.0:
+                    xs, ys, thetas = x, y, theta
+                else:
+                    vs, omegas = v0 + share * (v - v0), omega0 + share * (omega - omega0)
+                    xs, ys, thetas = unicycle_step(x0, y0, theta0, v0, omega0, vs, omegas, share * model.dt)
+                margin = certify(view, xs, ys)
+                spin = 0.0
+                if margin == UNDECIDED:
+                    margin = find_answer(answers, answered, xs, ys, thetas)
+                    if margin < 0.0:
+                        if not model.keep_cut and is_doomed(states, k - 1, control, model, view):
+                            return k - 1, BLOCKED, (xs, ys, thetas)
+                        return k - 1, ASK, (xs, ys, thetas)
+                    if margin == 0.0:
+                        return k - 1, BLOCKED, (xs, ys, thetas)
+                    if not view.is_round:
+                        spin = view.outer
+                if margin == COLLISION:
+                    return k - 1, BLOCKED, (xs, ys, thetas)
+                if travel + spin * turn == 0.0:
+                    break
         states[k, 0], states[k, 1], states[k, 2], states[k, 3], states[k, 4] = x, y, theta, v, omega
         if in_goal(model.goal, x, y, theta, v, omega):
-            return k, False, asked
-    return model.steps, False, asked
+            return k, EXTENDED, (x, y, theta)
+    return model.steps, EXTENDED, (x, y, theta)
 
 
 @njit(cache=True)
@@ -274,8 +328,8 @@ def extend(
     commands: NDArray[np.float64],
     model: Model,
     view: MapView,
-    answers: NDArray[np.int8],
-    questions: NDArray[np.int64],
+    answers: NDArray[np.float64],
+    answered: int,
 ) -> tuple[int, int, int, float, float, tuple[float, float, float]]:
     """EXTEND_TRAJECTORY of the paper: from a node towards a sample.
 
@@ -291,12 +345,12 @@ def extend(
         commands: command of each child, shape (n, 2).
         model: all settings.
         view: the clearance map.
-        answers: FCL's answers by candidate and step, shape (CANDIDATES, steps + 1).
-        questions: takes the steps that FCL must decide, shape (steps + 1,).
+        answers: what FCL has said in this extension, see :func:`find_answer`.
+        answered: rows of ``answers`` in use.
 
     Returns:
-        What came of it (`EXTENDED`, `REFUSED`, `BLOCKED` or `ASK`), the candidate chosen or in question, its number of
-        steps or of questions, its command (v, omega) and its control.
+        What came of it (`EXTENDED`, `REFUSED`, `BLOCKED` or `ASK`), the candidate chosen, its number of steps, its
+        command (v, omega) and its control; for `ASK`, the pose in question in place of the control.
     """
     node = states[0, 0]
     reference = reference_pose(node[0], node[1], node[2], x_sample, y_sample, model.look_ahead)
@@ -309,15 +363,15 @@ def extend(
             continue
         for i in range(5):
             states[c, 0, i] = node[i]
-        last, is_cut, asked = roll_out(states[c], control, model, view, answers[c], questions)
-        if last == 0 or (is_cut and not model.keep_cut):
+        last, outcome, pose = roll_out(states[c], control, model, view, answers, answered)
+        if outcome == ASK:
+            return ASK, c, 0, v, omega, pose
+        if last == 0 or (outcome == BLOCKED and not model.keep_cut):
             if result == REFUSED:
                 result = BLOCKED
             continue
         dx, dy = states[c, last, 0] - reference[0], states[c, last, 1] - reference[1]
         distance = dx * dx + dy * dy
-        if asked > 0 and (model.keep_cut or distance < nearest):
-            return ASK, c, asked, v, omega, control
         if distance < nearest:
             nearest = distance
             result, chosen, count = EXTENDED, c, last

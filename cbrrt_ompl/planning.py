@@ -126,7 +126,9 @@ def _plan_in_ompl(
         if seed is not None:
             # OMPL complains about a second seed in a process; yet all that is random below is allocated from here on
             ou.RNG.setSeed(seed + 1)
-        setup, equipment = make_equipped_setup(scenario, planner, clearance_map_for(scenario.world, scenario.robot.footprint))
+        setup, equipment = make_equipped_setup(
+            scenario, planner, clearance_map_for(scenario.world, scenario.robot.footprint)
+        )
         setup.setup()
         watch = _Watch(scenario.planning.max_samples, time_limit, progress)
         if not scenario.goal.violations(scenario.start):

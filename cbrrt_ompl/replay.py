@@ -67,9 +67,7 @@ def replay_path(
         control = (controls[i, 0], controls[i, 1], controls[i, 2])
         for _ in range(steps[i]):
             states[row, 0], states[row, 1], states[row, 2], states[row, 3], states[row, 4] = x, y, theta, v, omega
-            x, y, theta, v, omega, v_command, omega_command = advance(
-                x, y, theta, v, omega, control, model, model.dt
-            )
+            x, y, theta, v, omega, v_command, omega_command = advance(x, y, theta, v, omega, control, model, model.dt)
             commands[row, 0], commands[row, 1] = v_command, omega_command
             row += 1
     states[row, 0], states[row, 1], states[row, 2], states[row, 3], states[row, 4] = x, y, theta, v, omega

@@ -28,145 +28,8 @@ CONTACT_TOLERANCE = 1e-6
 _ZERO_DISTANCE = 1e-12
 """Distances up to this are contact: where shapes overlap, FCL returns 0, -1 or a denormal number [m]."""
 
-MAX_COORDINATE = 1e6
-"""Largest coordinate of a world [m]: beyond it the contact tolerance would drown in rounding."""
-
-
-@dataclass(frozen=True)
-class Bounds:
-    """The rectangle that the whole footprint must stay in; its sides are walls.
-
-    Raises:
-        WorldError: if a corner is not finite or the rectangle has no area.
-    """
-
-    min: tuple[float, float]
-    """Lower left corner [m]."""
-    max: tuple[float, float]
-    """Upper right corner [m]."""
-
-    def __post_init__(self) -> None:
-        """Check the corners."""
-        problems = _rectangle_problems("bounds", self.min, self.max)
-        if problems:
-            raise WorldError(problems)
-
-    @property
-    def size(self) -> tuple[float, float]:
-        """Width and height [m]."""
-        return self.max[0] - self.min[0], self.max[1] - self.min[1]
-
-    def contains(self, x: float, y: float) -> bool:
-        """Whether a point lies strictly inside."""
-        return self.min[0] < x < self.max[0] and self.min[1] < y < self.max[1]
-
-    def walls(self) -> list[Box]:
-        """Four solid walls around the rectangle, as thick as it is wide."""
-        (x0, y0), (x1, y1) = self.min, self.max
-        d = max(self.size)
-        return [
-            Box((x0 - d, y0 - d), (x0, y1 + d)),
-            Box((x1, y0 - d), (x1 + d, y1 + d)),
-            Box((x0 - d, y0 - d), (x1 + d, y0)),
-            Box((x0 - d, y1), (x1 + d, y1 + d)),
-        ]
-
-
-@dataclass(frozen=True)
-class Box:
-    """A solid rectangle along the axes.
-
-    Raises:
-        WorldError: if a corner is not finite or the rectangle has no area.
-    """
-
-    min: tuple[float, float]
-    """Lower left corner [m]."""
-    max: tuple[float, float]
-    """Upper right corner [m]."""
-
-    def __post_init__(self) -> None:
-        """Check the corners."""
-        problems = _rectangle_problems("box", self.min, self.max)
-        if problems:
-            raise WorldError(problems)
-
-    def to_shapely(self) -> shapely.Polygon:
-        """The same area as a shapely polygon."""
-        return shapely.box(*self.min, *self.max)
-
-
-@dataclass(frozen=True)
-class Disc:
-    """A solid disc.
-
-    Raises:
-        WorldError: if the centre is not finite or the radius not above 0.
-    """
-
-    center: tuple[float, float]
-    """Centre [m]."""
-    radius: float
-    """Radius [m]."""
-
-    def __post_init__(self) -> None:
-        """Check centre and radius."""
-        problems = []
-        if not all(_is_coordinate(c) for c in self.center):
-            problems.append(Problem("disc.center", self.center, _COORDINATES))
-        if not (0.0 < self.radius <= MAX_COORDINATE):
-            problems.append(Problem("disc.radius", self.radius, "a radius above 0 [m]"))
-        if problems:
-            raise WorldError(problems)
-
-    def to_shapely(self) -> shapely.Polygon:
-        """The disc as a shapely polygon of 256 sides."""
-        return shapely.Point(self.center).buffer(self.radius, quad_segs=64)
-
-
-@dataclass(frozen=True, eq=False)
-class Polygon:
-    """A solid simple polygon, convex or not, with holes if need be.
-
-    Raises:
-        WorldError: if the rings cross themselves or each other, or enclose no area.
-    """
-
-    vertices: NDArray[np.float64]
-    """Corners, counter-clockwise, shape (n, 2) [m]."""
-    holes: tuple[NDArray[np.float64], ...] = ()
-    """Rings that are cut out, each of shape (m, 2) [m]."""
-
-    def __post_init__(self) -> None:
-        """Check and freeze the rings."""
-        object.__setattr__(self, "vertices", counter_clockwise_ring(self.vertices, "polygon.vertices"))
-        holes = tuple(counter_clockwise_ring(h, f"polygon.holes[{i}]") for i, h in enumerate(self.holes))
-        object.__setattr__(self, "holes", holes)
-        if float(np.abs(self.vertices).max()) > MAX_COORDINATE:
-            raise WorldError(Problem("polygon.vertices", self.vertices.tolist(), _COORDINATES))
-        shape = self.to_shapely()
-        if not shape.is_valid:
-            reason = shapely.is_valid_reason(shape).lower()
-            raise WorldError(Problem("polygon.holes", len(holes), f"holes apart from each other and inside ({reason})"))
-
-    def __eq__(self, other: object) -> bool:
-        """Equal where all rings are, corner for corner."""
-        if not isinstance(other, Polygon):
-            return NotImplemented
-        mine, theirs = (self.vertices, *self.holes), (other.vertices, *other.holes)
-        return len(mine) == len(theirs) and all(np.array_equal(a, b) for a, b in zip(mine, theirs, strict=True))
-
-    def __hash__(self) -> int:
-        """Hash of the outer ring."""
-        return hash(self.vertices.tobytes())
-
-    def to_shapely(self) -> shapely.Polygon:
-        """The same area as a shapely polygon."""
-        return shapely.Polygon(self.vertices, self.holes)
-
-
-Obstacle: TypeAlias = Box | Disc | Polygon
-"""What may stand in a world."""
+MITRE_LIMIT = 5.0
+"""Corners of a grown footprint reach out by at most this many tolerances."""
 
 
 class World:
@@ -289,6 +152,21 @@ class CollisionChecker:
         self._move(self._exact, x, y, theta)
         return max(self._distance(), 0.0)
 
+    def margin(self, x: float, y: float, theta: float) -> float:
+        """How far the footprint may move from this pose [m, m, rad] before it touches anything.
+
+        Returns:
+            Its clearance less the contact tolerance [m]; 0 exactly where :meth:`collides` is true.
+        """
+        if not self._bounds.contains(x, y):
+            return 0.0
+        self.queries += 1
+        self._move(self._exact, x, y, theta)
+        margin = self._distance() - CONTACT_TOLERANCE
+        if margin > CONTACT_TOLERANCE:  # else within the rounding of two different queries
+            return margin
+        return 0.0 if self.collides(x, y, theta) else _ZERO_DISTANCE
+
     def signed_clearance(self, x: float, y: float) -> float:
         """Signed distance of the robot's origin [m]; see :meth:`World.signed_clearance`."""
         self.queries += 1
@@ -311,22 +189,6 @@ class CollisionChecker:
 @lru_cache(maxsize=32)
 def _checker(world: World, footprint: Footprint) -> CollisionChecker:
     return CollisionChecker(world, footprint)
-
-
-_COORDINATES = f"finite coordinates of at most {MAX_COORDINATE:g} m"
-
-
-def _is_coordinate(value: float) -> bool:
-    return abs(value) <= MAX_COORDINATE  # False for NaN
-
-
-def _rectangle_problems(name: str, low: Sequence[float], high: Sequence[float]) -> list[Problem]:
-    """What is wrong with the rectangle from low to high."""
-    if not all(_is_coordinate(c) for c in (*low, *high)):
-        return [Problem(name, [list(low), list(high)], _COORDINATES)]
-    if not (low[0] < high[0] and low[1] < high[1]):
-        return [Problem(name, [list(low), list(high)], "min below max in x and in y")]
-    return []
 
 
 def _extent(obstacle: Obstacle) -> float:
@@ -386,4 +248,4 @@ def _footprint_geometry(footprint: Footprint, growth: float) -> Any:
     if footprint.vertices is None:
         return fcl.Sphere(footprint.radius + growth)
     polygon = shapely.Polygon(footprint.vertices)
-    return _flat_mesh(polygon.buffer(growth, join_style="mitre") if growth > 0.0 else polygon)
+    return _flat_mesh(polygon.buffer(growth, join_style="mitre", mitre_limit=MITRE_LIMIT) if growth > 0.0 else polygon)

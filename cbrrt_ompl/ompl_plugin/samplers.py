@@ -14,10 +14,7 @@ from cbrrt_ompl.extension import (
     CANDIDATES,
     CLOSED_LOOP,
     EXTENDED,
-    FREE,
-    HIT,
     REFUSED,
-    UNKNOWN,
     extend,
     unpack_model,
 )
@@ -56,8 +53,6 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         unpacked = unpack_model.py_func(model)
         self._control_dimension = 3 if unpacked.law == CLOSED_LOOP else 2
         self._states = np.empty((CANDIDATES, unpacked.steps + 1, STATE_DIMENSION))
-        self._answers = np.full((CANDIDATES, unpacked.steps + 1), UNKNOWN, dtype=np.int8)
-        self._questions = np.empty(unpacked.steps + 1, dtype=np.int64)
         self._outcome = np.empty(OUTCOME_SIZE)
         self._first_child: dict[bytes, int] = {}
         self._following = np.empty(64, dtype=np.int32)
@@ -84,7 +79,7 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         self._sample.write(dest)
         return int(outcome[1])
 
-    def _extend(self, first: int) -> int:
+    def _extend(self, first: int, answered: int = 0) -> int:
         """Run the kernel on the present node and sample."""
         m = self._map
         return extend_packed(
@@ -98,24 +93,18 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
             m.clearances,
             m.frame,
             self._states,
-            self._answers,
-            self._questions,
+            m.answers,
+            answered,
             self._outcome,
         )
 
     def _ask_and_extend(self, first: int) -> int:
         """Answer the kernel's questions by FCL until it has none."""
-        status = ASK
+        status, answered = ASK, 0
         while status == ASK:
-            c, asked = int(self._outcome[0]), int(self._outcome[1])
-            for k in self._questions[:asked].tolist():
-                x, y, theta = self._states[c, k, :3].tolist()
-                hit = self._map.collides(x, y, theta)
-                self._answers[c, k] = HIT if hit else FREE
-                if hit:
-                    break
-            status = self._extend(first)
-        self._answers.fill(UNKNOWN)
+            x, y, theta = self._outcome[4:7].tolist()
+            answered = self._map.answer(answered, x, y, theta)
+            status = self._extend(first, answered)
         return status
 
     def _remember(self, node: bytes, v: float, omega: float) -> None:
@@ -139,7 +128,7 @@ class SteeringDirectedControlSampler(ExtensionSampler):
 
 
 OUTCOME_SIZE = 7
-"""Numbers of an outcome: candidate, steps (or questions), command (2), control (3)."""
+"""Numbers of an outcome: candidate, steps, command (2), control or pose in question (3)."""
 
 
 @njit(cache=True)
@@ -154,8 +143,8 @@ def extend_packed(
     clearances: NDArray[np.float64],
     frame: NDArray[np.float64],
     states: NDArray[np.float64],
-    answers: NDArray[np.int8],
-    questions: NDArray[np.int64],
+    answers: NDArray[np.float64],
+    answered: int,
     outcome: NDArray[np.float64],
 ) -> int:
     """:func:`cbrrt_ompl.extension.extend` for a caller in Python: flat arrays in, outcome and last state out."""
@@ -171,7 +160,7 @@ def extend_packed(
         unpack_model(model),
         unpack_view(children, clearances, frame),
         answers,
-        questions,
+        answered,
     )
     outcome[0], outcome[1], outcome[2], outcome[3] = chosen, count, v, omega
     outcome[4], outcome[5], outcome[6] = control

@@ -36,7 +36,9 @@ def make_state_space(bounds: Bounds, limits: Limits) -> Any:
     space.addSubspace(poses.getSubspace(1), 0.0)
     space.addSubspace(twists.getSubspace(0), 0.0)
     space.lock()
-    space.registerDefaultProjection(ob.SubspaceProjectionEvaluator(space, 0))  # before the set-up: afterwards OMPL would crash on it
+    space.registerDefaultProjection(
+        ob.SubspaceProjectionEvaluator(space, 0)
+    )  # before the set-up: afterwards OMPL would crash on it
     return space
 
 
