@@ -1,0 +1,379 @@
+"""The command line: ``cbrrt plan | verify | show | planners | demo``.
+
+Exit codes: 0 done, 1 not solved or not verified, 2 bad input, 130 interrupted. Modules that take long to import are
+imported where they are used, so that ``cbrrt --help`` answers at once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from cbrrt_ompl.errors import CbrrtError, InputError, Problem
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from cbrrt_ompl.planning import PlanResult
+
+DONE, FAILED, BAD_INPUT, INTERRUPTED, BROKEN_PIPE = 0, 1, 2, 130, 141
+TRAJECTORY_SUFFIXES = (".csv", ".npz", ".json")
+FIGURE_SUFFIXES = (".png", ".pdf", ".svg")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command line.
+
+    Args:
+        argv: the arguments after the program's name; None takes those of the process.
+
+    Returns:
+        The exit code.
+    """
+    try:
+        arguments = build_parser().parse_args(argv)
+        code: int = arguments.run(arguments)
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        print("cbrrt: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return BROKEN_PIPE
+    except (CbrrtError, OSError) as error:
+        _print_error(error)
+        return BAD_INPUT
+    return code
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The grammar of the command line."""
+    parser = _Parser(
+        prog="cbrrt", description="Plan trajectories for two-wheeled robots with CB-RRT and S-RRT in OMPL."
+    )
+    parser.add_argument("--version", action=_Version, help="print the version and exit")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    _add_plan(commands)
+    _add_verify(commands)
+    _add_show(commands)
+    _add_planners(commands)
+    _add_demo(commands)
+    return parser
+
+
+def _add_plan(commands: Any) -> None:
+    example = "cbrrt plan scenarios/paper_case1.yaml --seed 1 --trajectory case1.csv --figure case1.png"
+    parser = _add_command(commands, "plan", _plan, "plan a trajectory through a scenario", example)
+    parser.add_argument("scenario", type=Path, metavar="SCENARIO", help="scenario file (YAML)")
+    parser.add_argument("--planner", default="cb-rrt", metavar="NAME", help="see 'cbrrt planners' (default: cb-rrt)")
+    parser.add_argument("--seed", type=_seed, metavar="N", help="seed of the random numbers (default: a new one)")
+    parser.add_argument(
+        "--time-limit", type=_seconds, default=5.0, metavar="S", help="planning time at most [s] (default: 5)"
+    )
+    parser.add_argument("--trajectory", type=Path, metavar="FILE", help="write the trajectory: .csv, .npz or .json")
+    parser.add_argument("--figure", type=Path, metavar="FILE", help="draw scene, tree and path: .png, .pdf or .svg")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+
+
+def _add_verify(commands: Any) -> None:
+    example = "cbrrt verify case1.csv scenarios/paper_case1.yaml"
+    parser = _add_command(commands, "verify", _verify, "check a trajectory against a scenario", example)
+    parser.add_argument("trajectory", type=Path, metavar="TRAJECTORY", help="trajectory file: .csv, .npz or .json")
+    parser.add_argument("scenario", type=Path, metavar="SCENARIO", help="scenario file (YAML)")
+    parser.add_argument("--kinematic", action="store_true", help="let velocities jump, as those of s-rrt do")
+
+
+def _add_show(commands: Any) -> None:
+    example = "cbrrt show scenarios/paper_case1.yaml --trajectory case1.csv --figure case1.png"
+    parser = _add_command(commands, "show", _show, "draw a scenario, and a trajectory in it", example)
+    parser.add_argument("scenario", type=Path, metavar="SCENARIO", help="scenario file (YAML)")
+    parser.add_argument("--trajectory", type=Path, metavar="FILE", help="draw this trajectory too")
+    parser.add_argument("--figure", type=Path, metavar="FILE", help="write .png, .pdf or .svg instead of a window")
+
+
+def _add_planners(commands: Any) -> None:
+    _add_command(commands, "planners", _planners, "list the planners", "cbrrt planners")
+
+
+def _add_demo(commands: Any) -> None:
+    summary = "run both planners of the paper on its two scenes"
+    parser = _add_command(commands, "demo", _demo, summary, "cbrrt demo --output demo")
+    parser.add_argument(
+        "--output", type=Path, default=Path("demo"), metavar="DIR", help="folder for figures, trajectories and table"
+    )
+    parser.add_argument("--seed", type=_seed, default=1, metavar="N", help="seed of every plan (default: 1)")
+
+
+def _plan(arguments: argparse.Namespace) -> int:
+    """``cbrrt plan``."""
+    _check_outputs(
+        ("--trajectory", arguments.trajectory, TRAJECTORY_SUFFIXES), ("--figure", arguments.figure, FIGURE_SUFFIXES)
+    )
+    from cbrrt_ompl.planning import plan
+    from cbrrt_ompl.scenario import load_scenario
+
+    scenario = load_scenario(arguments.scenario)
+    with _progress(scenario.planning.max_samples, arguments.planner) as progress:
+        result = plan(scenario, arguments.planner, arguments.seed, arguments.time_limit, progress=progress)
+    written = None
+    if arguments.trajectory is not None and result.trajectory is not None:
+        written = arguments.trajectory
+        result.trajectory.save(written)
+    if arguments.figure is not None:
+        from cbrrt_ompl.figures import draw_plan
+
+        draw_plan(result, scenario).savefig(arguments.figure)
+    if arguments.json:
+        print(json.dumps(_json_result(scenario.name, result, written, arguments.figure), indent=2))
+    else:
+        _print_summary(scenario.name, result)
+        if arguments.trajectory is not None and written is None:
+            print(f"no trajectory, {arguments.trajectory} not written")
+    return DONE if result.solved else FAILED
+
+
+def _verify(arguments: argparse.Namespace) -> int:
+    """``cbrrt verify``."""
+    from cbrrt_ompl.scenario import load_scenario
+    from cbrrt_ompl.trajectory import Trajectory
+    from cbrrt_ompl.verification import verify
+
+    trajectory = Trajectory.load(arguments.trajectory)
+    if arguments.kinematic:
+        trajectory = replace(trajectory, kinematic=True)
+    verification = verify(trajectory, load_scenario(arguments.scenario))
+    print(verification.summary())
+    return DONE if verification.ok else FAILED
+
+
+def _show(arguments: argparse.Namespace) -> int:
+    """``cbrrt show``."""
+    _check_outputs(("--figure", arguments.figure, FIGURE_SUFFIXES))
+    from matplotlib.figure import Figure
+
+    from cbrrt_ompl.figures import draw_scene, draw_trajectory
+    from cbrrt_ompl.scenario import load_scenario
+    from cbrrt_ompl.trajectory import Trajectory
+
+    scenario = load_scenario(arguments.scenario)
+    trajectory = None if arguments.trajectory is None else Trajectory.load(arguments.trajectory)
+    size: dict[str, Any] = {"figsize": (6.4, 6.4), "layout": "constrained", "dpi": 150}
+    figure = Figure(**size) if arguments.figure is not None else _window(**size)
+    ax = draw_scene(figure.subplots(), scenario)
+    if trajectory is not None:
+        draw_trajectory(ax, trajectory, scenario.robot.footprint)
+    ax.set_title(scenario.name)
+    if arguments.figure is not None:
+        figure.savefig(arguments.figure)
+    else:
+        from matplotlib import pyplot
+
+        pyplot.show()
+    return DONE
+
+
+def _planners(arguments: argparse.Namespace) -> int:
+    """``cbrrt planners``."""
+    from cbrrt_ompl.planning import PLANNERS
+
+    width = max(map(len, PLANNERS))
+    for name, description in PLANNERS.items():
+        print(f"{name:{width}}  {description}")
+    return DONE
+
+
+def _demo(arguments: argparse.Namespace) -> int:
+    """``cbrrt demo``."""
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    from cbrrt_ompl.demo import COLUMNS, caveat, run_demo
+
+    widths = [max(len(name), width) for name, width in zip(COLUMNS, _DEMO_WIDTHS, strict=True)]
+    runs = []
+    print(_aligned(COLUMNS, widths), flush=True)
+    for run in run_demo(arguments.output, arguments.seed, _progress):
+        runs.append(run)
+        print(_aligned(run.cells(), widths), flush=True)
+    print(f"\n{caveat(arguments.seed)}\nscenarios, trajectories, figures and results.md: {arguments.output}")
+    return DONE if all(run.as_published for run in runs) else FAILED
+
+
+_DEMO_WIDTHS = (11, 7, 28, 6, 6, 6, 8, 8, 5, 5, 3, 3)
+"""Widths of the columns of the demo's table, where their names are not wider."""
+
+
+def _aligned(cells: Sequence[str], widths: Sequence[int]) -> str:
+    """Cells in columns, texts to the left and numbers to the right."""
+    left = 3
+    return "  ".join(
+        cell.ljust(width) if column < left else cell.rjust(width)
+        for column, (cell, width) in enumerate(zip(cells, widths, strict=True))
+    )
+
+
+def _window(**size: Any) -> Figure:
+    """A figure in a window, yet to be shown.
+
+    Raises:
+        CbrrtError: if there is no display.
+    """
+    from matplotlib import pyplot
+    from matplotlib.backends import BackendFilter, backend_registry
+
+    try:
+        figure = pyplot.figure(**size)
+        has_window = pyplot.get_backend().lower() in backend_registry.list_builtin(BackendFilter.INTERACTIVE)
+    except ImportError:
+        has_window = False
+    if not has_window:
+        raise CbrrtError("no display to open a window on, write a file with --figure FILE")
+    return figure
+
+
+def _print_summary(scenario: str, result: PlanResult) -> None:
+    """Print what came of a plan, a value a line."""
+    rows = [("scenario", scenario), ("planner", result.planner), ("status", result.status)]
+    if result.seed is not None:
+        rows.append(("seed", str(result.seed)))
+    rows += [
+        ("nodes", f"{result.nodes:,}"),
+        ("samples", f"{result.samples:,}"),
+        ("planning time", f"{1e3 * result.planning_time:.2f} ms"),
+    ]
+    if result.trajectory is not None:
+        rows += [
+            ("duration", f"{result.trajectory.duration:.2f} s"),
+            ("length", f"{result.trajectory.length:.2f} m"),
+            ("point turns", str(len(result.trajectory.point_turns))),
+        ]
+    width = max(len(name) for name, _ in rows)
+    for name, value in rows:
+        print(f"{name:{width}}  {value}")
+
+
+def _json_result(
+    scenario: str, result: PlanResult, trajectory_file: Path | None, figure_file: Path | None
+) -> dict[str, Any]:
+    """What came of a plan, in SI units, for machines."""
+    names = ("planner", "seed", "solved", "status", "nodes", "samples", "planning_time")
+    trajectory = result.trajectory
+    return {
+        "scenario": scenario,
+        **{name: getattr(result, name) for name in names},
+        "duration": None if trajectory is None else trajectory.duration,
+        "length": None if trajectory is None else trajectory.length,
+        "point_turns": None if trajectory is None else len(trajectory.point_turns),
+        "trajectory": None if trajectory_file is None else str(trajectory_file),
+        "figure": None if figure_file is None else str(figure_file),
+    }
+
+
+@contextmanager
+def _progress(total: int, label: str) -> Iterator[Callable[[int, float], None] | None]:
+    """A progress line for :func:`plan` once it has taken a second; None where nobody watches."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from tqdm import tqdm
+
+    with tqdm(total=total, desc=label, unit=" samples", delay=1.0, leave=False, file=sys.stderr) as bar:
+
+        def report(samples: int, elapsed: float) -> None:
+            bar.update(samples - bar.n)
+
+        yield report
+
+
+def _check_outputs(*outputs: tuple[str, Path | None, tuple[str, ...]]) -> None:
+    """Find out before any work whether its results can be written.
+
+    Args:
+        outputs: option, file (None for none) and the suffixes that it may have.
+
+    Raises:
+        InputError: with every file that cannot be written.
+    """
+    problems = []
+    for option, path, suffixes in outputs:
+        if path is None:
+            continue
+        if path.suffix.lower() not in suffixes:
+            problems.append(Problem(option, str(path), f"a file name that ends in {', '.join(suffixes)}"))
+        elif not path.parent.is_dir():
+            problems.append(Problem(option, str(path), f"a file in a folder that exists, {path.parent} does not"))
+        elif path.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
+            problems.append(Problem(option, str(path), "a file that may be written"))
+    if problems:
+        raise InputError(problems)
+
+
+def _print_error(error: CbrrtError | OSError) -> None:
+    """Print an error on stderr, every problem on a line of its own."""
+    text = str(error)
+    if isinstance(error, OSError) and error.strerror:
+        text = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    for line in text.splitlines():
+        print(f"cbrrt: error: {line}", file=sys.stderr)
+
+
+def _seconds(text: str) -> float:
+    """A time limit from the command line [s]."""
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
+    if not (math.isfinite(seconds) and seconds > 0.0):
+        raise argparse.ArgumentTypeError(f"got {text!r}, expected a number of seconds above 0")
+    return seconds
+
+
+def _seed(text: str) -> int:
+    """A seed from the command line."""
+    if not (text.isascii() and text.isdigit()):
+        raise argparse.ArgumentTypeError(f"got {text!r}, expected a whole number, 0 or more")
+    return int(text)
+
+
+def _add_command(
+    commands: Any, name: str, run: Callable[[argparse.Namespace], int], summary: str, example: str
+) -> argparse.ArgumentParser:
+    """A subcommand with its help and an example."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name,
+        help=summary,
+        description=f"{summary[0].upper()}{summary[1:]}.",
+        epilog=f"example:\n  {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.set_defaults(run=run)
+    return parser
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line, like all others of this program."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print the line and leave with exit code 2."""
+        self.exit(BAD_INPUT, f"cbrrt: error: {message} (see '{self.prog} --help')\n")
+
+
+class _Version(argparse.Action):
+    """``--version``, looked up only when asked for."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str, help: str) -> None:
+        """An option without a value."""
+        super().__init__(option_strings, dest, nargs=0, help=help)
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        """Print it and leave."""
+        from cbrrt_ompl import __version__
+
+        print(f"cbrrt {__version__}")
+        parser.exit()
