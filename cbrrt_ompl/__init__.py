@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from cbrrt_ompl.errors import CbrrtError, InputError
+    from cbrrt_ompl.obstacles import Bounds, Box, Disc, Polygon
     from cbrrt_ompl.ompl_plugin.setup import make_setup
     from cbrrt_ompl.planning import PlanResult, plan
     from cbrrt_ompl.robot import Footprint, Gains, Limits, Robot
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from cbrrt_ompl.settings import Goal, PlanningSettings, State
     from cbrrt_ompl.trajectory import Trajectory
     from cbrrt_ompl.verification import verify
-    from cbrrt_ompl.world import Bounds, Box, Disc, Polygon, World
+    from cbrrt_ompl.world import World
 
     __version__: str
 
@@ -49,6 +50,7 @@ __all__ = [
 
 _MODULES = {
     "errors": ("CbrrtError", "InputError"),
+    "obstacles": ("Bounds", "Box", "Disc", "Polygon"),
     "ompl_plugin.setup": ("make_setup",),
     "planning": ("PlanResult", "plan"),
     "robot": ("Footprint", "Gains", "Limits", "Robot"),
@@ -56,7 +58,7 @@ _MODULES = {
     "settings": ("Goal", "PlanningSettings", "State"),
     "trajectory": ("Trajectory",),
     "verification": ("verify",),
-    "world": ("Bounds", "Box", "Disc", "Polygon", "World"),
+    "world": ("World",),
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names}
 
@@ -65,15 +67,23 @@ def __getattr__(name: str) -> Any:
     """Look a public name up in the module that defines it, once."""
     value: object
     if name == "__version__":
-        from importlib.metadata import version
-
-        value = version("cbrrt-ompl")
+        value = _installed_version()
     elif name in _HOME:
         value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value
     return value
+
+
+def _installed_version() -> str:
+    """The version of the installed distribution; a checkout on the path alone has none."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("cbrrt-ompl")
+    except PackageNotFoundError:
+        return "0+unknown"
 
 
 def __dir__() -> list[str]:

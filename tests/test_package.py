@@ -1,0 +1,94 @@
+"""The package as a whole: its public names, its imports and how a process that uses it ends."""
+
+from __future__ import annotations
+
+import ast
+import json
+import re
+import subprocess
+import sys
+from importlib.metadata import PackageNotFoundError, packages_distributions, version
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import cbrrt_ompl
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+
+@pytest.fixture(scope="module")
+def project(repository: Path) -> dict[str, Any]:
+    """The table of the project in pyproject.toml."""
+    with (repository / "pyproject.toml").open("rb") as file:
+        table: dict[str, Any] = tomllib.load(file)["project"]
+    return table
+
+
+def run_python(code: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
+
+
+@pytest.mark.parametrize(
+    ("ending", "exit_code"),
+    [("pass", 0), ("sys.exit(0)", 0), ("sys.exit(3)", 3), ("raise RuntimeError('on purpose')", 1)],
+    ids=["import alone", "exit 0", "exit 3", "uncaught exception"],
+)
+def test_a_process_that_imported_ompl_ends_with_its_own_exit_code(ending: str, exit_code: int) -> None:
+    """OMPL's wheel loads libompl twice, and every process that imported it ended in "double free"."""
+    done = run_python(f"import sys\nimport cbrrt_ompl.ompl_plugin.binding\n{ending}")
+    assert done.returncode == exit_code, done.stderr
+    assert ("on purpose" in done.stderr) == (exit_code == 1)
+
+
+def test_a_process_that_planned_ends_with_its_own_exit_code(scenarios: Path) -> None:
+    code = f"""import sys, cbrrt_ompl
+result = cbrrt_ompl.plan(cbrrt_ompl.load_scenario({str(scenarios / "paper_case1.yaml")!r}), time_limit=0.05)
+sys.exit(7)"""
+    done = run_python(code)
+    assert done.returncode == 7, done.stderr
+
+
+def test_importing_the_package_imports_nothing_heavy() -> None:
+    done = run_python("import sys, json, cbrrt_ompl; print(json.dumps([m.split('.')[0] for m in sys.modules]))")
+    assert done.returncode == 0, done.stderr
+    assert not {"ompl", "numba", "matplotlib", "numpy", "shapely", "fcl"} & set(json.loads(done.stdout))
+
+
+def test_public_names_are_sorted_and_resolve() -> None:
+    assert cbrrt_ompl.__all__ == sorted(cbrrt_ompl.__all__)
+    for name in cbrrt_ompl.__all__:
+        assert getattr(cbrrt_ompl, name) is not None
+    assert set(cbrrt_ompl.__all__) <= set(dir(cbrrt_ompl))
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'plam'"):
+        _ = cbrrt_ompl.plam
+
+
+def test_the_version_is_that_of_the_project(project: dict[str, Any]) -> None:
+    try:
+        version("cbrrt-ompl")
+    except PackageNotFoundError:
+        pytest.skip("a checkout that is not installed has no version")
+    assert cbrrt_ompl.__version__ == project["version"]
+
+
+def test_every_third_party_import_is_a_declared_dependency(repository: Path, project: dict[str, Any]) -> None:
+    imported = set()
+    for path in (repository / "cbrrt_ompl").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                imported |= {alias.name.split(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                imported.add(node.module.split(".")[0])
+    third_party = imported - sys.stdlib_module_names - {"cbrrt_ompl"}
+    declared = {re.split("[=>]", line)[0].lower() for line in project["dependencies"]}
+    distributions = packages_distributions()
+    needed = {distributions[name][0].lower() for name in third_party}
+    assert needed <= declared
