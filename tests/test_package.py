@@ -7,7 +7,7 @@ import json
 import re
 import subprocess
 import sys
-from importlib.metadata import PackageNotFoundError, packages_distributions, version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,10 @@ if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
+
+
+DISTRIBUTIONS = {"fcl": "python-fcl", "yaml": "pyyaml", "PIL": "pillow"}
+"""Distributions whose name is not that of the module."""
 
 
 @pytest.fixture(scope="module")
@@ -89,6 +93,4 @@ def test_every_third_party_import_is_a_declared_dependency(repository: Path, pro
                 imported.add(node.module.split(".")[0])
     third_party = imported - sys.stdlib_module_names - {"cbrrt_ompl"}
     declared = {re.split("[=>]", line)[0].lower() for line in project["dependencies"]}
-    distributions = packages_distributions()
-    needed = {distributions[name][0].lower() for name in third_party}
-    assert needed <= declared
+    assert {DISTRIBUTIONS.get(name, name) for name in third_party} <= declared
