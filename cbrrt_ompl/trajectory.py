@@ -8,7 +8,7 @@ import math
 import os
 import uuid
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -76,7 +76,7 @@ class Trajectory:
     """Commanded forward velocities [m/s]."""
     omega_command: NDArray[np.float64]
     """Commanded turning rates [rad/s]."""
-    kinematic: bool = False
+    kinematic: bool = field(default=False, kw_only=True)
     """Whether the velocities jump to their commands."""
 
     def __post_init__(self) -> None:
@@ -270,12 +270,12 @@ def _array(name: str, values: ArrayLike) -> NDArray[np.float64]:
     return array.astype(np.float64)
 
 
-def _problems(arrays: Mapping[str, NDArray[np.float64]], field: Callable[[str, int], str]) -> list[Problem]:
+def _problems(arrays: Mapping[str, NDArray[np.float64]], place: Callable[[str, int], str]) -> list[Problem]:
     """What keeps the arrays from being a trajectory.
 
     Args:
         arrays: the columns by name, one-dimensional.
-        field: name for messages of the value in a column and a row.
+        place: name for messages of the value in a column and a row.
     """
     rows = len(arrays["t"])
     if rows == 0:
@@ -287,11 +287,11 @@ def _problems(arrays: Mapping[str, NDArray[np.float64]], field: Callable[[str, i
     ]
     for name, array in arrays.items():
         for row in np.flatnonzero(~np.isfinite(array))[:1]:
-            found.append(Problem(field(name, row), float(array[row]), "a finite number"))
+            found.append(Problem(place(name, row), float(array[row]), "a finite number"))
     if not found:
         t = arrays["t"]
         for row in np.flatnonzero(t[1:] <= t[:-1])[:1] + 1:
-            found.append(Problem(field("t", row), float(t[row]), f"a time above {float(t[row - 1])!r}, the one before"))
+            found.append(Problem(place("t", row), float(t[row]), f"a time above {float(t[row - 1])!r}, the one before"))
     return found
 
 

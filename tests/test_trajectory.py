@@ -29,16 +29,26 @@ def profile(
     zero = np.zeros(len(t))
     heading = zero if theta is None else np.array(theta)
     return Trajectory(
-        np.array(t), zero, zero, heading, np.array(v), np.array(omega), np.array(v), np.array(omega), kinematic
+        np.array(t),
+        zero,
+        zero,
+        heading,
+        np.array(v),
+        np.array(omega),
+        np.array(v),
+        np.array(omega),
+        kinematic=kinematic,
     )
 
 
 def arc(rows: int = 21, radius: float = 2.0, speed: float = 1.0, kinematic: bool = False) -> Trajectory:
     """A circular arc about (0, radius) at constant speed, a row every 0.1 s."""
-    t = 0.1 * np.arange(rows)
+    t = np.linspace(0.0, 0.1 * (rows - 1), rows)
     angle = speed / radius * t
     v, omega = np.full(rows, speed), np.full(rows, speed / radius)
-    return Trajectory(t, radius * np.sin(angle), radius * (1 - np.cos(angle)), angle, v, omega, v, omega, kinematic)
+    return Trajectory(
+        t, radius * np.sin(angle), radius * (1 - np.cos(angle)), angle, v, omega, v, omega, kinematic=kinematic
+    )
 
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
@@ -222,7 +232,8 @@ def test_velocities_between_the_rows_are_linear_or_the_command() -> None:
     t, v, omega = [0.0, 1.0], [0.0, 1.0], [0.0, -2.0]
     np.testing.assert_allclose(profile(t, v, omega).at(0.25)[0, 3:], [0.25, -0.5])
     command = np.array([3.0, 3.0])
-    jumps = Trajectory(*np.array([t, t, t, t, v, omega]), command, command, kinematic=True)
+    zero = np.zeros(2)
+    jumps = Trajectory(np.array(t), zero, zero, zero, np.array(v), zero, command, command, kinematic=True)
     np.testing.assert_allclose(jumps.at([0.0, 0.25, 1.0])[:, 3], [0.0, 3.0, 1.0])
 
 
@@ -365,7 +376,7 @@ def test_a_damaged_npz_file_raises_nothing_else(
 def test_an_npz_file_with_pickled_objects_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "pickled.npz"
     values = {**dict.fromkeys(COLUMNS, np.zeros(1)), "kinematic": np.array(False), "x": np.array([{}], dtype=object)}
-    np.savez(path, **values)
+    np.savez(path, allow_pickle=True, **values)
     with pytest.raises(TrajectoryError, match="an undamaged NPZ archive"):
         Trajectory.load(path)
 
@@ -415,7 +426,7 @@ def test_a_tree_counts_its_nodes_and_keeps_read_only_copies() -> None:
     assert len(tree) == 2 and tree.states[0, 0] == 0.0 and tree.parents.dtype == np.int64
     for array in (tree.states, tree.parents, tree.polyline):
         assert not array.flags.writeable
-    assert len(Tree(np.empty((0, 5)), np.empty(0), np.empty((0, 2)))) == 0
+    assert len(Tree(np.empty((0, 5)), np.empty(0, dtype=np.int64), np.empty((0, 2)))) == 0
 
 
 @pytest.mark.parametrize(
