@@ -1,0 +1,314 @@
+"""Verification: what is right passes, and every kind of tampering is found, named and timed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cbrrt_ompl.errors import SettingsError
+from cbrrt_ompl.obstacles import Bounds, Box
+from cbrrt_ompl.robot import Footprint, Limits, Robot
+from cbrrt_ompl.scenario import Scenario
+from cbrrt_ompl.settings import Goal, PlanningSettings, State
+from cbrrt_ompl.trajectory import Trajectory
+from cbrrt_ompl.verification import verify
+from cbrrt_ompl.world import World
+
+DT = 0.05
+LIMITS = Limits()
+START = State(-4.0, -4.0, 0.5)
+COMMANDS = ((1.0, 0.0, 3.0), (0.8, 0.5, 2.0), (0.0, 0.0, 2.0), (0.0, -0.5, 2.0), (0.0, 0.0, 1.0), (0.7, 0.2, 3.0))
+"""(v, omega, duration): drive, turn left, stop, turn on the spot, stop turning, drive on."""
+
+
+def drive(
+    kinematic: bool = False, start: State = START, commands: tuple[tuple[float, float, float], ...] = COMMANDS
+) -> Trajectory:
+    """A trajectory by plain small steps: the velocities in closed form, the pose in 40 midpoint steps each."""
+    state, parts = list(start), 40
+    rows: list[list[float]] = []
+    for v_command, omega_command, duration in commands:
+        for _ in range(round(duration / DT)):
+            rows.append([len(rows) * DT, *state, v_command, omega_command])
+            x, y, theta, v, omega = state
+            if kinematic:
+                v, omega = v_end, omega_end = v_command, omega_command
+            else:
+                v_end = float(np.clip(v_command, v - LIMITS.acceleration * DT, v + LIMITS.acceleration * DT))
+                most = LIMITS.angular_acceleration * DT
+                omega_end = float(np.clip(omega_command, omega - most, omega + most))
+            for part in range(parts):
+                share = (part + 0.5) / parts
+                heading = theta + share * DT * (omega + 0.5 * share * (omega_end - omega))
+                speed = v + share * (v_end - v)
+                x += speed * math.cos(heading) * DT / parts
+                y += speed * math.sin(heading) * DT / parts
+            theta = math.remainder(theta + 0.5 * DT * (omega + omega_end), math.tau)
+            state = [x, y, theta, v_end, omega_end]
+    rows.append([len(rows) * DT, *state, *rows[-1][6:]])
+    return Trajectory(*np.array(rows).T, kinematic=kinematic)
+
+
+def scenario_for(
+    trajectory: Trajectory,
+    obstacles: tuple[Box, ...] = (),
+    footprint: Footprint | None = None,
+    limits: Limits = LIMITS,
+    start: State = START,
+    goal: Goal | None = None,
+) -> Scenario:
+    """The scenario that a trajectory solves, if nothing else is given."""
+    return Scenario(
+        name="test",
+        world=World(Bounds((-5.0, -5.0), (5.0, 5.0)), obstacles),
+        robot=Robot(footprint=Footprint.point() if footprint is None else footprint, limits=limits),
+        start=start,
+        goal=Goal(float(trajectory.x[-1]), float(trajectory.y[-1]), 0.2) if goal is None else goal,
+        planning=PlanningSettings(),
+    )
+
+
+def changed(trajectory: Trajectory, column: str, row: int, by: float) -> Trajectory:
+    """The trajectory with one value tampered with."""
+    values = getattr(trajectory, column).copy()
+    values[row] += by
+    return replace(trajectory, **{column: values})
+
+
+def kinds(trajectory: Trajectory, scenario: Scenario) -> set[str]:
+    return {violation.kind for violation in verify(trajectory, scenario).violations}
+
+
+@pytest.fixture(scope="module")
+def honest() -> Trajectory:
+    return drive()
+
+
+@pytest.fixture(scope="module")
+def scenario(honest: Trajectory) -> Scenario:
+    return scenario_for(honest)
+
+
+@pytest.mark.parametrize("kinematic", [False, True])
+def test_a_trajectory_that_keeps_everything_is_valid_to_a_micrometre(kinematic: bool) -> None:
+    trajectory = drive(kinematic)
+    result = verify(trajectory, scenario_for(trajectory), tolerance=1e-5)
+    assert result.violations == ()
+    assert result.ok
+
+
+def test_a_trajectory_of_one_row_is_valid_where_the_start_is_in_the_goal() -> None:
+    stay = Trajectory(*np.array([[0.0, *START, 0.0, 0.0]]).T)
+    assert verify(stay, scenario_for(stay)).ok
+
+
+def test_headings_are_compared_through_the_wrap() -> None:
+    start = State(0.0, 0.0, 3.0)
+    circle = drive(start=start, commands=((0.3, 0.5, 14.0),))
+    assert np.ptp(circle.theta) > 6.0
+    assert verify(circle, scenario_for(circle, start=start)).ok
+    unwrapped = replace(circle, theta=np.unwrap(circle.theta))
+    assert verify(unwrapped, scenario_for(circle, start=start)).ok
+
+
+@pytest.mark.parametrize("column", ["x", "y", "theta"])
+def test_a_shifted_row_is_found_at_its_time(honest: Trajectory, scenario: Scenario, column: str) -> None:
+    (violation,) = verify(changed(honest, column, 50, 0.0011), scenario).violations
+    assert (violation.kind, violation.time, violation.count) == ("motion", pytest.approx(2.5), 1)
+    assert "differs by 0.0011" in violation.message and "at t = 2.5 s, tolerance 0.001" in violation.message
+    assert verify(changed(honest, column, 50, 0.0009), scenario).ok
+
+
+def test_a_shift_of_all_later_rows_is_counted_to_the_end(honest: Trajectory, scenario: Scenario) -> None:
+    shift = np.where(honest.t > 9.99, 0.02, 0.0)
+    (violation,) = verify(replace(honest, y=honest.y + shift), scenario).violations
+    assert violation.kind == "motion"
+    assert violation.last_time == honest.t[-1]
+    assert "position differs by 0.02 m" in violation.message and "61 rows, until t = 13 s" in violation.message
+
+
+@pytest.mark.parametrize(("column", "unit"), [("v", "m/s"), ("omega", "rad/s")])
+def test_a_jump_of_a_velocity_breaks_the_acceleration_and_the_motion(
+    honest: Trajectory, scenario: Scenario, column: str, unit: str
+) -> None:
+    tampered = changed(honest, column, 20, 0.1)
+    violations = {violation.kind: violation for violation in verify(tampered, scenario).violations}
+    assert set(violations) == {"acceleration", "motion"}
+    rate = (getattr(tampered, column)[20] - getattr(honest, column)[19]) / DT
+    assert violations["acceleration"].message.startswith(f"acceleration: {column} changes by {rate:.6g} {unit}^2 at")
+    assert violations["acceleration"].time == pytest.approx(0.95)
+
+
+def test_accelerating_at_exactly_the_limit_is_allowed_and_a_millionth_more_is_not(honest: Trajectory) -> None:
+    weaker = LIMITS._replace(acceleration=LIMITS.acceleration / (1.0 + 1e-6))
+    result = verify(honest, scenario_for(honest, limits=weaker))
+    assert {violation.kind for violation in result.violations} == {"acceleration"}
+    assert "v changes by 0.6 m/s^2 at t = 0 s, limit 0.599999 m/s^2" in result.violations[0].message
+
+
+@pytest.mark.parametrize(
+    ("limits", "text"),
+    [
+        (LIMITS._replace(v_max=0.9), "v{} = 1 m/s at t = {} s, limits 0 to 0.9 m/s"),
+        (LIMITS._replace(omega_max=0.4), "omega{} = 0.5 rad/s at t = {} s, limits -0.523599 to 0.4 rad/s"),
+        (LIMITS._replace(omega_min=-0.3), "omega{} = -0.5 rad/s at t = {} s, limits -0.3 to 0.523599 rad/s"),
+    ],
+)
+def test_an_exceeded_limit_is_found_in_velocities_and_commands(limits: Limits, text: str) -> None:
+    trajectory = drive(kinematic=True)
+    violations = verify(trajectory, scenario_for(trajectory, limits=limits)).violations
+    assert [violation.kind for violation in violations] == ["velocity", "command"]
+    for violation, suffix in zip(violations, ("", "_command"), strict=True):
+        assert violation.message.startswith(f"{violation.kind}: {text.format(suffix, f'{violation.time:.6g}')}")
+    assert violations[0].time == pytest.approx(violations[1].time + DT)
+
+
+def test_a_tampered_command_is_found_through_the_motion_it_would_cause(honest: Trajectory, scenario: Scenario) -> None:
+    tampered = changed(honest, "v_command", 59, -1.0)
+    result = verify(tampered, scenario)
+    assert {violation.kind for violation in result.violations} == {"motion"}
+    assert min(violation.time for violation in result.violations) == pytest.approx(3.0)
+
+
+def test_a_command_out_of_range_is_found_even_where_it_changes_nothing(honest: Trajectory, scenario: Scenario) -> None:
+    (violation,) = verify(changed(honest, "v_command", 0, 5.0), scenario).violations
+    assert violation.message == "command: v_command = 6 m/s at t = 0 s, limits 0 to 1 m/s"
+
+
+def wall_at(trajectory: Trajectory, row: float, thickness: float) -> Box:
+    """A wall across the first, straight piece, centred between rows."""
+    x = float(np.interp(row, np.arange(len(trajectory)), trajectory.x))
+    return Box((x - thickness / 2, -5.0), (x + thickness / 2, 0.0))
+
+
+def test_a_wall_too_thin_for_the_rows_is_found_between_them(honest: Trajectory) -> None:
+    wall = wall_at(honest, 45.25, 0.002)
+    hits = [wall.min[0] <= x <= wall.max[0] for x in honest.x]
+    assert not any(hits)
+    violations = verify(honest, scenario_for(honest, (wall,))).violations
+    assert {violation.kind for violation in violations} == {"collision"}
+    assert [violation.time for violation in violations] == pytest.approx([45.25 * DT] * 2)
+    assert "the stored motion touches an obstacle or a wall at t = 2.2625 s" in violations[0].message
+    assert "the motion computed again touches" in violations[1].message
+
+
+def test_rows_far_apart_hide_no_wall() -> None:
+    """Four checks between rows 1 s apart would miss a wall of 0.1 m."""
+    limits = Limits(acceleration=1000.0)
+    t = np.arange(4.0)
+    ones, zero = np.ones(4), np.zeros(4)
+    straight = Trajectory(t, t - 2.0, zero, zero, ones, zero, ones, zero)
+    start, wall = State(-2.0, 0.0, 0.0, 1.0), Box((-1.45, -1.0), (-1.35, 1.0))
+    assert verify(straight, scenario_for(straight, limits=limits, start=start)).ok
+    assert kinds(straight, scenario_for(straight, (wall,), limits=limits, start=start)) == {"collision"}
+
+
+def test_rows_too_far_apart_to_be_checked_are_a_violation() -> None:
+    t, zero = np.array([0.0, 1000.0]), np.zeros(2)
+    wait = Trajectory(t, zero, zero, zero, zero, zero, zero, zero)
+    (violation,) = verify(wait, scenario_for(wait, start=State(0.0, 0.0))).violations
+    assert violation.message == "sampling: the next row is 1000 s away at t = 0 s, at most 50 s can be checked"
+
+
+def test_the_footprint_collides_where_its_centre_does_not(honest: Trajectory) -> None:
+    obstacle = Box(
+        (float(honest.x[40]), float(honest.y[40]) - 0.4), (float(honest.x[40]) + 0.1, float(honest.y[40]) - 0.3)
+    )
+    assert verify(honest, scenario_for(honest, (obstacle,))).ok
+    assert kinds(honest, scenario_for(honest, (obstacle,), Footprint.disc(0.35))) == {"collision"}
+
+
+def test_only_one_of_stored_and_computed_motion_in_an_obstacle_is_reported_as_that(
+    honest: Trajectory, scenario: Scenario
+) -> None:
+    tampered = changed(honest, "x", 200, 20.0)
+    messages = [v.message for v in verify(tampered, scenario).violations if v.kind == "collision"]
+    assert len(messages) == 1 and "the stored motion touches" in messages[0]
+
+
+@pytest.mark.parametrize(("index", "name"), list(enumerate(State._fields)))
+def test_a_wrong_start_is_named_by_its_value(honest: Trajectory, index: int, name: str) -> None:
+    for off, count in ((0.9e-6, 0), (1.1e-6, 1)):
+        start = START._replace(**{name: START[index] + off})
+        violations = verify(honest, scenario_for(honest, start=start)).violations
+        assert [violation.message.split(" =")[0] for violation in violations] == [f"start: {name}"] * count
+
+
+def test_a_start_heading_a_full_turn_away_is_the_same(honest: Trajectory) -> None:
+    assert verify(honest, scenario_for(honest, start=START._replace(theta=START.theta + 2 * math.pi))).ok
+
+
+def test_a_missed_goal_is_reported_in_the_words_of_the_goal(honest: Trajectory) -> None:
+    goal = Goal(float(honest.x[-1]) + 0.3, float(honest.y[-1]), 0.2, speed_tolerance=0.1)
+    violations = verify(honest, scenario_for(honest, goal=goal)).violations
+    assert [violation.message for violation in violations] == [
+        "goal: 0.3 m from the goal, tolerance 0.2 m, at the end, t = 13 s",
+        "goal: arrives with v = 0.7 m/s, tolerance 0.1, at the end, t = 13 s",
+        "goal: arrives with omega = 0.2 rad/s, tolerance 0.1, at the end, t = 13 s",
+    ]
+
+
+def test_kinematic_motion_verified_as_dynamic_fails_with_the_hint() -> None:
+    trajectory = replace(drive(kinematic=True), kinematic=False)
+    result = verify(trajectory, scenario_for(trajectory))
+    assert not result.ok
+    assert "verified as kinematic" in result.hint
+    assert result.hint in result.summary()
+
+
+def test_a_jump_that_is_none_of_a_kinematic_planner_gets_no_hint(honest: Trajectory, scenario: Scenario) -> None:
+    assert verify(changed(honest, "v", 20, 0.1), scenario).hint == ""
+
+
+def test_dynamic_motion_verified_as_kinematic_fails(honest: Trajectory, scenario: Scenario) -> None:
+    assert "motion" in kinds(replace(honest, kinematic=True), scenario)
+
+
+def test_the_smallest_clearance_is_the_distance_of_the_footprint_at_the_nearest_row(honest: Trajectory) -> None:
+    row = 100
+    x, y = float(honest.x[row]), float(honest.y[row])
+    obstacle = Box((x - 0.01, y - 1.0), (x + 0.01, y - 0.5))
+    result = verify(honest, scenario_for(honest, (obstacle,), Footprint.disc(0.2)))
+    distances: NDArray[np.float64] = np.hypot(
+        np.maximum(np.abs(honest.x - x) - 0.01, 0.0), np.maximum(honest.y - (y - 0.5), 0.0)
+    )
+    assert result.smallest_clearance == pytest.approx(distances.min() - 0.2, abs=1e-9)
+    assert result.smallest_clearance_time == honest.t[np.argmin(distances)]
+
+
+def test_absurd_numbers_are_violations_not_crashes(honest: Trajectory, scenario: Scenario) -> None:
+    for column in ("x", "theta", "v", "omega", "v_command", "t"):
+        row = len(honest) - 1 if column == "t" else 30
+        assert not verify(changed(honest, column, row, 1e308), scenario).ok
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, math.nan, math.inf])
+def test_a_tolerance_that_is_none_is_refused(honest: Trajectory, scenario: Scenario, tolerance: float) -> None:
+    with pytest.raises(SettingsError, match="tolerance: got .*, expected a number above 0"):
+        verify(honest, scenario, tolerance=tolerance)
+
+
+def test_the_summary_says_what_was_checked_with_which_tolerance(honest: Trajectory, scenario: Scenario) -> None:
+    result = verify(honest, scenario, tolerance=0.002)
+    lines = result.summary().splitlines()
+    assert lines[0] == "trajectory of 261 rows, 13 s: valid"
+    assert any("integrated again from the commands, to 0.002 " in line for line in lines)
+    assert f"collisions by FCL at {result.checks} states" in result.summary()
+    assert result.checks == 261 + 260 * 4 + 1 + 260 * 4
+    assert lines[-1].startswith(f"smallest clearance: {result.smallest_clearance:.4g} m at t = ")
+    assert "accelerations not checked" not in result.summary()
+
+
+def test_the_summary_of_a_kinematic_trajectory_says_that_accelerations_were_not_checked() -> None:
+    trajectory = drive(kinematic=True)
+    assert "accelerations not checked" in verify(trajectory, scenario_for(trajectory)).summary()
+
+
+def test_the_summary_of_a_failure_lists_every_violation(honest: Trajectory, scenario: Scenario) -> None:
+    result = verify(changed(honest, "v", 20, 0.1), scenario)
+    assert result.summary().startswith("trajectory of 261 rows, 13 s: NOT VALID, 2 violations\n")
+    assert [line.strip() for line in result.summary().splitlines()[1:3]] == [v.message for v in result.violations]
