@@ -1,0 +1,382 @@
+"""Figures of worlds, trees and trajectories: each function draws on the axes given to it, none shows or saves.
+
+The colours keep the paper's convention (tree red, path green, point turns blue) in shades that colour-blind readers
+tell apart; line widths and markers tell them apart in grey print.
+"""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib import patheffects
+from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.legend_handler import HandlerPolyCollection
+from matplotlib.patches import Circle, Polygon, Rectangle, Wedge
+from matplotlib.path import Path
+from numpy.typing import NDArray
+
+from cbrrt_ompl.obstacles import Box, Disc, Obstacle
+from cbrrt_ompl.robot import Footprint, Limits
+from cbrrt_ompl.trajectory import Trajectory
+from cbrrt_ompl.tree import Tree
+from cbrrt_ompl.world import World
+
+if TYPE_CHECKING:
+    from cbrrt_ompl.planning import PlanResult
+    from cbrrt_ompl.scenario import Scenario
+
+TREE_COLOR = "#CC3311"
+PATH_COLOR = "#007A5E"
+TURN_COLOR = "#0072B2"
+START_COLOR = "black"
+GOAL_COLOR = "#E69F00"
+OBSTACLE_COLOR = "0.62"
+COMMAND_COLOR = "0.45"
+
+FOOTPRINTS_ALONG_PATH = 20
+"""Outlines of the footprint along a path, at most."""
+
+_HALO = [patheffects.withStroke(linewidth=3.4, foreground="white")]
+
+
+def draw_world(ax: Axes, world: World) -> Axes:
+    """Draw bounds and obstacles, the obstacles as one collection.
+
+    Args:
+        ax: axes of the plane; their limits and labels are set.
+        world: what is drawn.
+
+    Returns:
+        The axes.
+    """
+    paths = [_path(obstacle) for obstacle in world.obstacles]
+    solids = PathCollection(paths, facecolor=OBSTACLE_COLOR, edgecolor=OBSTACLE_COLOR, linewidth=0.4, zorder=1)
+    solids.set_label("obstacle" if paths else "_nolegend_")
+    ax.add_collection(solids, autolim=False)
+    (x0, y0), (width, height) = world.bounds.min, world.bounds.size
+    border = Rectangle((x0, y0), width, height, fill=False, edgecolor="black", linewidth=1.0, zorder=3)
+    border.set_gid("bounds")
+    ax.add_patch(border)
+    margin = 0.015 * max(width, height)
+    ax.set_xlim(x0 - margin, x0 + width + margin)
+    ax.set_ylim(y0 - margin, y0 + height + margin)
+    ax.set_aspect("equal", adjustable="box")
+    ax.spines[:].set_visible(False)  # the bounds are the frame
+    ax.set_xlabel("x [m]")
+    ax.set_ylabel("y [m]")
+    return ax
+
+
+def draw_scene(ax: Axes, scenario: Scenario) -> Axes:
+    """Draw the world, the footprint and heading at the start, and the goal region.
+
+    Args:
+        ax: axes of the plane; their limits and labels are set.
+        scenario: what is drawn.
+
+    Returns:
+        The axes.
+    """
+    draw_world(ax, scenario.world)
+    mark = 0.05 * max(scenario.world.bounds.size)  # length of a heading mark [m]
+    _draw_start(ax, scenario, mark)
+    _draw_goal(ax, scenario, mark)
+    return ax
+
+
+def draw_tree(ax: Axes, tree: Tree) -> Axes:
+    """Draw nodes as small red dots and edges as thin red lines, as in the paper's Fig. 4.
+
+    Args:
+        ax: axes of the plane.
+        tree: what is drawn.
+
+    Returns:
+        The axes.
+    """
+    size = 1.0 + 2.0 / (1.0 + len(tree) / 500.0)
+    x, y = tree.polyline.T
+    ax.plot(x, y, color=TREE_COLOR, linewidth=0.5, alpha=0.7, zorder=2, scalex=False, scaley=False, label="edge")
+    ax.plot(
+        tree.states[:, 0],
+        tree.states[:, 1],
+        linestyle="none",
+        marker="o",
+        markersize=size,
+        markeredgewidth=0.0,
+        color=TREE_COLOR,
+        zorder=2.1,
+        scalex=False,
+        scaley=False,
+        label="node",
+    )
+    return ax
+
+
+def draw_trajectory(ax: Axes, trajectory: Trajectory, footprint: Footprint | None = None) -> Axes:
+    """Draw the path in green, point turns as blue squares, and the footprint now and then.
+
+    Args:
+        ax: axes of the plane.
+        trajectory: what is drawn.
+        footprint: the robot's area; None or a point draws none.
+
+    Returns:
+        The axes.
+    """
+    if footprint is not None and footprint.kind != "point":
+        outlines = [footprint.outline_at(pose, segments=32) for pose in _poses_along(trajectory, footprint)]
+        ax.add_collection(
+            PolyCollection(
+                outlines,
+                facecolor="none",
+                edgecolor=PATH_COLOR,
+                linewidth=0.6,
+                alpha=0.8,
+                zorder=2.5,
+                label="footprint",
+            ),
+            autolim=False,
+        )
+    style: dict[str, Any] = {"scalex": False, "scaley": False}
+    ax.plot(
+        trajectory.x,
+        trajectory.y,
+        color=PATH_COLOR,
+        linewidth=1.8,
+        path_effects=_HALO,
+        solid_capstyle="round",
+        zorder=4,
+        label="path",
+        **style,
+    )
+    turns = trajectory.point_turns
+    if turns:
+        ax.plot(
+            [turn.x for turn in turns],
+            [turn.y for turn in turns],
+            linestyle="none",
+            marker="s",
+            markersize=5.0,
+            markerfacecolor=TURN_COLOR,
+            markeredgecolor="white",
+            markeredgewidth=0.6,
+            zorder=5,
+            label="point turn",
+            **style,
+        )
+    return ax
+
+
+def draw_velocities(axes: Sequence[Axes], trajectory: Trajectory, limits: Limits) -> Sequence[Axes]:
+    """Draw both velocities over time with their commands and limits, a dot every second, as in the paper's Fig. 6.
+
+    Args:
+        axes: axes for v [m/s] and for omega [deg/s].
+        trajectory: what is drawn.
+        limits: the ranges, drawn as dashed lines.
+
+    Returns:
+        The axes.
+    """
+    seconds = trajectory.t[0] + np.arange(math.floor(trajectory.duration) + 1)
+    dots = trajectory.at(np.minimum(seconds, trajectory.t[-1]))
+    degrees = math.degrees(1.0)
+    for ax, values, commands, at_seconds, low, high, label in (
+        (axes[0], trajectory.v, trajectory.v_command, dots[:, 3], limits.v_min, limits.v_max, "v [m/s]"),
+        (
+            axes[1],
+            degrees * trajectory.omega,
+            degrees * trajectory.omega_command,
+            degrees * dots[:, 4],
+            degrees * limits.omega_min,
+            degrees * limits.omega_max,
+            r"$\omega$ [deg/s]",
+        ),
+    ):
+        for limit in (low, high):
+            ax.axhline(limit, color="black", linestyle="--", linewidth=0.9, label="limit" if limit == high else None)
+        ax.plot(trajectory.t, commands, color=COMMAND_COLOR, linewidth=0.7, drawstyle="steps-post", label="command")
+        ax.plot(
+            trajectory.t,
+            values,
+            color=PATH_COLOR,
+            linewidth=1.5,
+            drawstyle="steps-pre" if trajectory.kinematic else "default",
+            label="velocity",
+        )
+        ax.plot(
+            seconds,
+            at_seconds,
+            linestyle="none",
+            marker="o",
+            markersize=3.2,
+            markerfacecolor=TURN_COLOR,
+            markeredgewidth=0.0,
+            label="every second",
+        )
+        margin = 0.12 * (high - low)
+        ax.set_ylim(
+            min(low, values.min(), commands.min()) - margin,
+            max(high, values.max(), commands.max()) + margin,
+        )
+        ax.set_xlim(trajectory.t[0], max(float(trajectory.t[-1]), float(trajectory.t[0]) + 1e-3))
+        ax.set_ylabel(label)
+        ax.grid(True, linewidth=0.4, color="0.88")
+        ax.set_axisbelow(True)
+    axes[1].set_xlabel("t [s]")
+    return axes
+
+
+def draw_plan(result: PlanResult, scenario: Scenario) -> Figure:
+    """Draw what a planner found: scene, tree and path beside the two velocity curves.
+
+    Args:
+        result: what :func:`cbrrt_ompl.planning.plan` returned, solved or not.
+        scenario: what it was planned for.
+
+    Returns:
+        A figure of its own, not known to pyplot, as wide as two columns of a paper.
+    """
+    trajectory = result.trajectory
+    width, height = scenario.world.bounds.size
+    tall = min(max(3.5 * height / width, 2.4), 6.0)
+    figure = Figure(figsize=(7.2 if trajectory is not None else 4.6, tall + 0.9), layout="constrained", dpi=150)
+    figure.suptitle(plan_title(result, scenario), fontsize=9, parse_math=False)
+    if trajectory is None:
+        plane = figure.add_subplot()
+    else:
+        grid = figure.add_gridspec(2, 2, width_ratios=(1.15, 1.0))
+        plane = figure.add_subplot(grid[:, 0])
+        upper = figure.add_subplot(grid[0, 1])
+        lower = figure.add_subplot(grid[1, 1], sharex=upper)
+        draw_velocities((upper, lower), trajectory, scenario.robot.limits)
+        upper.tick_params(labelbottom=False)
+        figure.align_ylabels((upper, lower))
+        _legend_above(upper)
+    draw_scene(plane, scenario)
+    draw_tree(plane, result.tree)
+    if trajectory is not None:
+        draw_trajectory(plane, trajectory, scenario.robot.footprint)
+    _legend_above(plane)
+    for ax in figure.axes:
+        ax.tick_params(labelsize=8)
+        ax.xaxis.label.set_fontsize(9)
+        ax.yaxis.label.set_fontsize(9)
+    return figure
+
+
+def plan_title(result: PlanResult, scenario: Scenario) -> str:
+    """Scenario and planner; on another line nodes, samples, planning time and duration of the trajectory."""
+    found = f"{result.trajectory.duration:.2f} s of driving" if result.trajectory is not None else result.status
+    return (
+        f"{textwrap.fill(f'{scenario.name}, {result.planner}', 56)}\n{result.nodes:,} nodes, "
+        f"{result.samples:,} samples, {1e3 * result.planning_time:.3g} ms, {found}"
+    )
+
+
+def _legend_above(ax: Axes) -> None:
+    """Put the legend above the axes, where no data are."""
+    handles, labels = ax.get_legend_handles_labels()
+    shown = {label: handle for handle, label in zip(handles, labels, strict=True)}
+    ax.legend(
+        shown.values(),
+        shown.keys(),
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        ncols=4,
+        fontsize=7.5,
+        frameon=False,
+        handlelength=1.6,
+        columnspacing=1.2,
+        handler_map={PathCollection: HandlerPolyCollection()},
+    )
+
+
+def _path(obstacle: Obstacle) -> Path:
+    """Outline of an obstacle in the world, with its holes."""
+    if isinstance(obstacle, Box):
+        (x0, y0), (x1, y1) = obstacle.min, obstacle.max
+        return Path(np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]), closed=True)
+    if isinstance(obstacle, Disc):
+        return Path.circle(obstacle.center, obstacle.radius)
+    rings = [obstacle.vertices, *(hole[::-1] for hole in obstacle.holes)]
+    return Path.make_compound_path(*(Path(np.vstack([ring, ring[:1]]), closed=True) for ring in rings))
+
+
+def _draw_start(ax: Axes, scenario: Scenario, mark: float) -> None:
+    """Footprint and heading at the start."""
+    x, y, theta = scenario.start[:3]
+    footprint = scenario.robot.footprint
+    if footprint.kind != "point":
+        outline = footprint.outline_at((x, y, theta))
+        ax.add_patch(Polygon(outline, fill=False, edgecolor=START_COLOR, linewidth=1.0, zorder=6))
+    _draw_heading(ax, x, y, theta, max(mark, 1.3 * footprint.circumscribed_radius), START_COLOR)
+    ax.plot(
+        x,
+        y,
+        linestyle="none",
+        marker="o",
+        markersize=4.5,
+        color=START_COLOR,
+        zorder=6,
+        scalex=False,
+        scaley=False,
+        label="start",
+    )
+
+
+def _draw_goal(ax: Axes, scenario: Scenario, mark: float) -> None:
+    """Disc of the goal and, where it is restricted, the sector of the headings."""
+    goal = scenario.goal
+    ax.add_patch(
+        Circle((goal.x, goal.y), goal.tolerance, facecolor=GOAL_COLOR, edgecolor="none", alpha=0.35, zorder=1.5)
+    )
+    border = Circle(
+        (goal.x, goal.y), goal.tolerance, fill=False, edgecolor="black", linewidth=0.9, linestyle=(0, (3, 2)), zorder=6
+    )
+    ax.add_patch(border)
+    ax.plot(
+        goal.x,
+        goal.y,
+        linestyle="none",
+        marker="+",
+        markersize=6,
+        color="black",
+        zorder=6,
+        scalex=False,
+        scaley=False,
+        label="goal",
+    )
+    if goal.theta is not None:
+        reach = max(mark, goal.tolerance)
+        half, middle = math.degrees(min(goal.heading_tolerance, math.pi)), math.degrees(goal.theta)
+        ax.add_patch(Wedge((goal.x, goal.y), reach, middle - half, middle + half, color="black", alpha=0.15, zorder=6))
+        _draw_heading(ax, goal.x, goal.y, goal.theta, reach, "black")
+
+
+def _draw_heading(ax: Axes, x: float, y: float, theta: float, length: float, color: str) -> None:
+    """An arrow from a position along a heading."""
+    tip = (x + length * math.cos(theta), y + length * math.sin(theta))
+    ax.annotate(
+        "",
+        xy=tip,
+        xytext=(x, y),
+        arrowprops={"arrowstyle": "-|>", "color": color, "linewidth": 1.0, "shrinkA": 0.0, "shrinkB": 0.0},
+        zorder=6,
+    )
+
+
+def _poses_along(trajectory: Trajectory, footprint: Footprint) -> NDArray[np.float64]:
+    """Poses spaced by at least the size of the footprint along the path, the last one among them, shape (k, 3)."""
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(trajectory.x), np.diff(trajectory.y)))])
+    spacing = max(2.0 * footprint.circumscribed_radius, way[-1] / FOOTPRINTS_ALONG_PATH)
+    wanted = np.arange(way[-1], 0.0, -spacing) if spacing > 0.0 else way[-1:]
+    rows = np.searchsorted(way, wanted) if len(wanted) else np.array([len(way) - 1])
+    return trajectory.poses[np.unique(rows)]
