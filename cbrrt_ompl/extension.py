@@ -26,8 +26,8 @@ OPEN_LOOP, CLOSED_LOOP, STEERING = 0, 1, 2
 EXTENDED, REFUSED, BLOCKED, ASK = 0, 1, 2, 3
 """What came of an extension: a new node, line 5 of Algorithm II, an obstacle, or a question to FCL."""
 
-MOTION_RESOLUTION = 2.5e-4
-"""Checks along a motion are at least this far apart [m]: nothing thicker than this is passed through."""
+MOTION_RESOLUTION = 1e-4
+"""Largest distance between two checked points of a motion [m]: nothing thicker than this is passed through."""
 
 CANDIDATES = 3
 """Extensions tried for one sample at most: the three steering rates of S-RRT."""
@@ -97,6 +97,13 @@ def pack_model(law: int, robot: Robot, goal: Goal, planning: PlanningSettings) -
         planning.cut_extension == "keep",
     )
     return np.array([*head, *robot.limits, *robot.gains, *region], dtype=float)
+
+
+def law_of(planner: str, planning: PlanningSettings) -> int:
+    """How a planner drives: `STEERING`, `CLOSED_LOOP` or `OPEN_LOOP` (as OMPL's own planners do)."""
+    if planner.startswith("s-rrt"):
+        return STEERING
+    return CLOSED_LOOP if planner.startswith("cb-rrt") and planning.closed_loop else OPEN_LOOP
 
 
 @njit(cache=True)
@@ -209,10 +216,10 @@ def roll_out(
 ) -> tuple[int, int, tuple[float, float, float]]:
     """Drive from a valid state under one control until the horizon, the goal or an obstacle.
 
-    The way is checked without gaps: a position with margin m proves the next m metres, and the next check is where the
-    proof ends, be it between two steps. (With a footprint that is not round, an answer of FCL's holds for the heading
-    asked; then turning uses the margin up as well, at the circumscribed radius.) Where the margin is smaller than
-    `MOTION_RESOLUTION`, checks are that far apart.
+    The way is checked between the steps too: each step has points no more than `MOTION_RESOLUTION` apart, and each of
+    them must be free. A point with margin m proves all points of the next m metres, so few of them are looked at. (With
+    a footprint that is not round, an answer of FCL's holds for the heading asked; then turning uses the margin up as
+    well, at the circumscribed radius.) What is accepted depends on these points alone, never on what the map holds.
 
     Args:
         states: row 0 holds the start; the others are filled, shape (steps + 1, 5).
@@ -227,39 +234,44 @@ def roll_out(
     """
     x, y, theta, v, omega = states[0, 0], states[0, 1], states[0, 2], states[0, 3], states[0, 4]
     margin = max(certify(view, x, y), 0.0)
-    spin = 0.0 if view.is_round or margin > 0.0 else view.outer  # margin used up by a turn [m/rad]
+    is_certified = margin > 0.0  # certificates hold for all headings, answers of FCL's for one
+    reach = 0.0 if view.is_round else view.outer
     for k in range(1, model.steps + 1):
         x0, y0, theta0, v0, omega0 = x, y, theta, v, omega
         x, y, theta, v, omega, _, _ = advance(x, y, theta, v, omega, control, model, model.dt)
         if model.law == STEERING:
             v0, omega0 = v, omega
-        travel, turn = max(abs(v0), abs(v)) * model.dt, max(abs(omega0), abs(omega)) * model.dt
-        margin -= travel + spin * turn
-        if margin <= 0.0 and travel + spin * turn > 0.0:
-            margin += travel + spin * turn
-            share = 0.0
-            while share < 1.0:
-                share += max(margin, MOTION_RESOLUTION) / (travel + spin * turn)
-                if share >= 1.0:
+        travel = max(abs(v0), abs(v)) * model.dt
+        sweep = travel + reach * max(abs(omega0), abs(omega)) * model.dt
+        if margin >= (travel if is_certified else sweep):
+            margin -= travel if is_certified else sweep
+        else:
+            points = int(sweep / MOTION_RESOLUTION) + 1
+            i = 0
+            while True:
+                spacing = (travel if is_certified else sweep) / points
+                i += 1 + (int(margin / spacing) if spacing > 1e-12 else points)
+                if i > points:
+                    margin -= (points + 1 - i + int(margin / spacing)) * spacing if spacing > 1e-12 else 0.0
+                    break
+                if i == points:
                     xs, ys, thetas = x, y, theta
                 else:
+                    share = i / points
                     vs, omegas = v0 + share * (v - v0), omega0 + share * (omega - omega0)
                     xs, ys, thetas = unicycle_step(x0, y0, theta0, v0, omega0, vs, omegas, share * model.dt)
                 margin = certify(view, xs, ys)
-                spin = 0.0
+                is_certified = True
                 if margin == UNDECIDED:
+                    is_certified = False
                     margin = find_answer(answers, answered, xs, ys, thetas)
                     if margin < 0.0:
                         if not model.keep_cut and is_doomed(states, k - 1, control, model, view):
                             return k - 1, BLOCKED, (xs, ys, thetas)
                         return k - 1, ASK, (xs, ys, thetas)
-                    if margin == 0.0:
-                        return k - 1, BLOCKED, (xs, ys, thetas)
-                    if not view.is_round:
-                        spin = view.outer
-                if margin == COLLISION:
+                if margin <= 0.0:
                     return k - 1, BLOCKED, (xs, ys, thetas)
-                if travel + spin * turn == 0.0:
+                if i == points:
                     break
         states[k, 0], states[k, 1], states[k, 2], states[k, 3], states[k, 4] = x, y, theta, v, omega
         if in_goal(model.goal, x, y, theta, v, omega):

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from cbrrt_ompl.clearance_map import clearance_map_for
+from cbrrt_ompl.compiled.growth import SAMPLES
+from cbrrt_ompl.compiled.search import Search
 from cbrrt_ompl.errors import Problem, SettingsError, UnknownPlannerError
-from cbrrt_ompl.ompl_plugin.binding import ob, ou
-from cbrrt_ompl.ompl_plugin.results import trajectory_from_path, tree_from_planner
-from cbrrt_ompl.ompl_plugin.setup import make_equipped_setup
+from cbrrt_ompl.extension import check_step, law_of, pack_model
 from cbrrt_ompl.replay import trajectory_from_controls
 from cbrrt_ompl.scenario import Scenario
 from cbrrt_ompl.trajectory import Trajectory
@@ -25,6 +23,8 @@ from cbrrt_ompl.tree import Tree
 PLANNERS: dict[str, str] = {
     "cb-rrt": "CB-RRT of the paper: the Kanayama law in OMPL's control::RRT",
     "s-rrt": "S-RRT, the paper's baseline: full speed, three steering rates; kinematic",
+    "cb-rrt-compiled": "CB-RRT as one compiled loop: the same kernels, many times as fast",
+    "s-rrt-compiled": "S-RRT as one compiled loop",
     "rrt": "OMPL's control::RRT with random controls",
     "kpiece1": "OMPL's KPIECE1",
     "est": "OMPL's expansive space trees",
@@ -104,7 +104,13 @@ def plan(
     if planner not in PLANNERS:
         raise UnknownPlannerError(planner, list(PLANNERS))
     _check_arguments(seed, time_limit)
-    return _plan_in_ompl(scenario, planner, seed, time_limit, progress)
+    check_step(scenario.robot, scenario.planning)
+    watch = _Watch(time_limit, progress)
+    if not scenario.goal.violations(scenario.start):
+        return _already_there(scenario, planner, seed)
+    if planner.endswith("-compiled"):
+        return _plan_compiled(scenario, planner, seed, watch)
+    return _plan_in_ompl(scenario, planner, seed, watch)
 
 
 def _check_arguments(seed: int | None, time_limit: float) -> None:
@@ -118,44 +124,52 @@ def _check_arguments(seed: int | None, time_limit: float) -> None:
         raise SettingsError(problems)
 
 
-def _plan_in_ompl(
-    scenario: Scenario, planner: str, seed: int | None, time_limit: float, progress: Progress | None
-) -> PlanResult:
-    """Plan with a planner that OMPL runs."""
-    with _quiet_ompl():
-        if seed is not None:
-            # OMPL complains about a second seed in a process; yet all that is random below is allocated from here on
-            ou.RNG.setSeed(seed + 1)
-        setup, equipment = make_equipped_setup(
-            scenario, planner, clearance_map_for(scenario.world, scenario.robot.footprint)
-        )
-        setup.setup()
-        watch = _Watch(scenario.planning.max_samples, time_limit, progress)
-        if not scenario.goal.violations(scenario.start):
-            return _already_there(scenario, planner, seed, equipment.model)
-        began = time.perf_counter()
-        condition = ob.PlannerTerminationCondition(ob.PlannerTerminationConditionFn(watch))
-        setup.solve(condition)
-        planning_time = time.perf_counter() - began
-        space, si = setup.getStateSpace(), setup.getSpaceInformation()
-        solved = setup.haveExactSolutionPath()
-        trajectory = trajectory_from_path(setup.getSolutionPath(), space, equipment.model) if solved else None
-        data = ob.PlannerData(si)
-        setup.getPlanner().getPlannerData(data)
+def _plan_compiled(scenario: Scenario, planner: str, seed: int | None, watch: _Watch) -> PlanResult:
+    """Plan with the compiled loop, without OMPL."""
+    planning = scenario.planning
+    search = Search(
+        pack_model(law_of(planner, planning), scenario.robot, scenario.goal, planning),
+        clearance_map_for(scenario.world, scenario.robot.footprint),
+        [scenario.start],
+        seed,
+        goal_bias=planning.goal_bias,
+        neighbours=planning.nearest_neighbour,
+    )
+    watch.start()
+    search.run(watch.should_stop, planning.max_samples)
+    planning_time = watch.elapsed()
     return PlanResult(
         planner=planner,
         seed=seed,
-        status=SOLVED if solved else watch.ended_by,
-        trajectory=trajectory,
-        nodes=data.numVertices(),
-        samples=equipment.sampler.samples if equipment.sampler is not None else watch.rounds,
+        status=SOLVED if search.has_reached_goal else watch.ended_by,
+        trajectory=search.trajectory() if search.has_reached_goal else None,
+        nodes=search.nodes,
+        samples=int(search.counters[SAMPLES]),
         planning_time=planning_time,
-        make_tree=lambda: tree_from_planner(setup.getPlanner(), si, space, equipment.model),
+        make_tree=search.tree,
     )
 
 
-def _already_there(scenario: Scenario, planner: str, seed: int | None, model: Any) -> PlanResult:
+def _plan_in_ompl(scenario: Scenario, planner: str, seed: int | None, watch: _Watch) -> PlanResult:
+    """Plan with a planner that OMPL runs."""
+    from cbrrt_ompl.ompl_plugin.run import run  # here, so that the compiled planners need no OMPL
+
+    found = run(scenario, planner, seed, watch.start, watch.should_stop)
+    return PlanResult(
+        planner=planner,
+        seed=seed,
+        status=SOLVED if found.trajectory is not None else watch.ended_by,
+        trajectory=found.trajectory,
+        nodes=found.nodes,
+        samples=found.samples,
+        planning_time=found.planning_time,
+        make_tree=found.make_tree,
+    )
+
+
+def _already_there(scenario: Scenario, planner: str, seed: int | None) -> PlanResult:
     """The plan of a robot that starts in its goal region: stay."""
+    model = pack_model(law_of(planner, scenario.planning), scenario.robot, scenario.goal, scenario.planning)
     start = np.array([scenario.start], dtype=float)
     stay = trajectory_from_controls(start[0], np.empty((0, 3)), np.empty(0, dtype=np.int64), model)
     tree = Tree(start, np.array([-1]), np.empty((0, 2)))
@@ -163,41 +177,30 @@ def _already_there(scenario: Scenario, planner: str, seed: int | None, model: An
 
 
 class _Watch:
-    """OMPL's termination condition: called once a round, it counts, keeps the time and reports.
+    """Keeps the time of a search and reports its progress."""
 
-    Being Python code, it also lets a Ctrl-C through to the planner.
-    """
-
-    def __init__(self, max_rounds: int, time_limit: float, progress: Progress | None) -> None:
-        self.rounds = 0
+    def __init__(self, time_limit: float, progress: Progress | None) -> None:
         self.ended_by = SAMPLE_LIMIT
-        self._max_rounds = max_rounds
-        self._began = time.perf_counter()
-        self._deadline = self._began + time_limit
+        self._time_limit = time_limit
         self._progress = progress
+        self._began = self._next_report = 0.0
+
+    def start(self) -> None:
+        """Begin to count the time."""
+        self._began = time.perf_counter()
         self._next_report = self._began + PROGRESS_PERIOD
 
-    def __call__(self) -> bool:
-        """Whether the planner must stop."""
-        if self.rounds >= self._max_rounds:
-            return True
+    def elapsed(self) -> float:
+        """Time since the start [s]."""
+        return time.perf_counter() - self._began
+
+    def should_stop(self, samples: int) -> bool:
+        """Whether the time is up; being Python code, this also lets a Ctrl-C through to the planner."""
         now = time.perf_counter()
-        if now >= self._deadline:
+        if now - self._began >= self._time_limit:
             self.ended_by = TIME_LIMIT
             return True
-        self.rounds += 1
         if self._progress is not None and now >= self._next_report:
             self._next_report = now + PROGRESS_PERIOD
-            self._progress(self.rounds, now - self._began)
+            self._progress(samples, now - self._began)
         return False
-
-
-@contextmanager
-def _quiet_ompl() -> Iterator[None]:
-    """Keep OMPL's log off the caller's terminal."""
-    level = ou.getLogLevel()
-    ou.setLogLevel(ou.LOG_NONE)
-    try:
-        yield
-    finally:
-        ou.setLogLevel(level)

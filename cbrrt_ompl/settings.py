@@ -12,6 +12,9 @@ from cbrrt_ompl.robot import Limits
 CUT_EXTENSION = ("discard", "keep")
 """What may become of an extension that meets an obstacle before its horizon."""
 
+NEAREST_NEIGHBOUR = ("grid", "kd-tree", "brute-force")
+"""Ways in which the compiled planners find the node nearest to a sample."""
+
 
 class State(NamedTuple):
     """A state of SE(2) x R^2, of start poses and of trajectories alike."""
@@ -120,6 +123,8 @@ class PlanningSettings:
     """Largest distance of the reference from its node [m]; None is ``v_max * horizon``."""
     closed_loop: bool = False
     """Evaluate the Kanayama law at every step instead of once an extension."""
+    nearest_neighbour: str = "grid"
+    """How the compiled planners find the nearest node: ``grid``, ``kd-tree`` or ``brute-force``."""
 
     def __post_init__(self) -> None:
         """Check all values together."""
@@ -136,8 +141,9 @@ class PlanningSettings:
             problems.append(Problem("planning.goal_bias", self.goal_bias, "a number from 0 to 1"))
         if not (isinstance(self.max_samples, int) and self.max_samples >= 1):
             problems.append(Problem("planning.max_samples", self.max_samples, "a whole number of 1 or more"))
-        if self.cut_extension not in CUT_EXTENSION:
-            problems.append(Problem("planning.cut_extension", self.cut_extension, f"one of {', '.join(CUT_EXTENSION)}"))
+        for name, known in (("cut_extension", CUT_EXTENSION), ("nearest_neighbour", NEAREST_NEIGHBOUR)):
+            if getattr(self, name) not in known:
+                problems.append(Problem(f"planning.{name}", getattr(self, name), f"one of {', '.join(known)}"))
         if not math.isfinite(self.equal_control_tolerance):
             problems.append(
                 Problem("planning.equal_control_tolerance", self.equal_control_tolerance, "a finite number")

@@ -50,8 +50,9 @@ def tree_from_planner(planner: Any, si: Any, space: Any, model: NDArray[np.float
         for child in children:
             edge = data.getEdge(parent, child)
             parents[child] = parent
-            controls[child] = _control(edge.getControl(), model)
-            steps[child] = round(edge.getDuration() / model[1])
+            if edge.getControl() is not None:  # PDST gives none for edges that it has split
+                controls[child] = _control(edge.getControl(), model)
+                steps[child] = round(edge.getDuration() / model[1])
     return tree_from_controls(states, parents, controls, steps, model)
 
 

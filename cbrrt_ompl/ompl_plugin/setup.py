@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cbrrt_ompl.clearance_map import ClearanceMap
 from cbrrt_ompl.errors import UnknownPlannerError
-from cbrrt_ompl.extension import CLOSED_LOOP, OPEN_LOOP, STEERING, check_step, pack_model
+from cbrrt_ompl.extension import CLOSED_LOOP, check_step, law_of, pack_model
 from cbrrt_ompl.ompl_plugin.binding import ob, oc
 from cbrrt_ompl.ompl_plugin.decomposition import PositionDecomposition
 from cbrrt_ompl.ompl_plugin.goals import make_goal
@@ -42,13 +42,6 @@ OMPL_PLANNERS: dict[str, Callable[[Any, Scenario], Any]] = {
     "syclop-est": lambda si, s: oc.SyclopEST(si, PositionDecomposition(s.world.bounds)),
 }
 """OMPL's own planners, with their own samplers and settings, on the dynamic motion model."""
-
-
-def law_of(planner: str, scenario: Scenario) -> int:
-    """How a planner drives: `STEERING`, `CLOSED_LOOP` or `OPEN_LOOP`."""
-    if planner == "s-rrt":
-        return STEERING
-    return CLOSED_LOOP if planner == "cb-rrt" and scenario.planning.closed_loop else OPEN_LOOP
 
 
 @dataclass
@@ -100,7 +93,7 @@ def make_equipped_setup(
     check_step(scenario.robot, scenario.planning)
     limits, bounds = scenario.robot.limits, scenario.world.bounds
     space = make_state_space(bounds, limits)
-    if law_of(planner, scenario) == CLOSED_LOOP:
+    if law_of(planner, scenario.planning) == CLOSED_LOOP:
         setup = oc.SimpleSetup(make_reference_space(space, bounds))
     else:
         setup = oc.SimpleSetup(make_control_space(space, limits))
@@ -131,7 +124,7 @@ def equip(si: Any, space: Any, scenario: Scenario, planner: str, clearance_map: 
         clearance_map: decides the states.
     """
     equipment = Equipment(
-        pack_model(law_of(planner, scenario), scenario.robot, scenario.goal, scenario.planning), clearance_map
+        pack_model(law_of(planner, scenario.planning), scenario.robot, scenario.goal, scenario.planning), clearance_map
     )
     si.setStatePropagator(TwoWheelPropagator(si, space, equipment.model))
     si.clearDirectedSamplerAllocator()

@@ -1,0 +1,215 @@
+"""A search by the compiled loop: its memory, its questions to FCL, its time."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cbrrt_ompl.clearance_map import ClearanceMap
+from cbrrt_ompl.compiled.growth import (
+    COUNTERS,
+    DRAWN,
+    DRAWS,
+    NODES,
+    REACHED,
+    SAMPLES,
+    WANT_ANSWER,
+    WANT_DRAWS,
+    WANT_ROOM,
+    TreeArrays,
+    add_node,
+    grow,
+    rebuild_index,
+)
+from cbrrt_ompl.compiled.nearest import GRID, KD_TREE, KINDS, Index
+from cbrrt_ompl.extension import CANDIDATES, CLOSED_LOOP
+from cbrrt_ompl.replay import trajectory_from_controls, tree_from_controls
+from cbrrt_ompl.settings import State
+from cbrrt_ompl.trajectory import Trajectory
+from cbrrt_ompl.tree import Tree
+
+DRAWS_AT_ONCE = 4096
+"""Samples whose random numbers are drawn at once."""
+
+PAUSE = 0.002
+"""Aim for the time between two looks at the clock [s]."""
+
+FIRST_CAPACITY = 256
+"""Nodes that a search has room for at first; doubled when full."""
+
+
+class Search:
+    """One tree, grown by the compiled loop.
+
+    Attributes:
+        counters: nodes, samples and more, see :mod:`cbrrt_ompl.compiled.growth`.
+        has_reached_goal: whether the last node is in the goal region.
+    """
+
+    def __init__(
+        self,
+        model: NDArray[np.float64],
+        clearance_map: ClearanceMap,
+        starts: Sequence[State],
+        seed: int | None = None,
+        *,
+        goal_bias: float = 0.0,
+        neighbours: str = "grid",
+    ) -> None:
+        """Plant the start states.
+
+        Args:
+            model: packed model, see :func:`cbrrt_ompl.extension.pack_model`.
+            clearance_map: decides the states.
+            starts: states of the roots.
+            seed: of the search's own generator; None draws a fresh one.
+            goal_bias: share of samples that are the goal.
+            neighbours: `grid`, `kd-tree` or `brute-force`.
+        """
+        self.model, self._map = model, clearance_map
+        self._rng = np.random.default_rng(seed)
+        self._goal_bias = goal_bias
+        self._kind = KINDS[neighbours]
+        self._is_closed_loop = int(model[0]) == CLOSED_LOOP
+        self._draws = np.empty((0, DRAWS))
+        self._buffer = np.empty((CANDIDATES, int(model[2]) + 1, 5))
+        self._question = np.empty(3)
+        self.counters = np.zeros(COUNTERS, dtype=np.int64)
+        self.has_reached_goal = False
+        self._tree = _tree_arrays(FIRST_CAPACITY, self._is_closed_loop)
+        self._make_index(FIRST_CAPACITY)
+        for node, start in enumerate(starts):
+            self._tree.states[node] = start
+            self._tree.steps[node] = 0
+            add_node(self._tree, self._index, node, -1)
+            self.counters[NODES] += 1
+
+    def run(self, should_stop: Callable[[int], bool], max_samples: int) -> None:
+        """Grow the tree until a node is in the goal region.
+
+        Args:
+            should_stop: asked every few milliseconds with the samples so far.
+            max_samples: total of samples to stop at.
+        """
+        portion = 64
+        while not self.has_reached_goal and self.counters[SAMPLES] < max_samples:
+            if should_stop(int(self.counters[SAMPLES])):
+                return
+            before, began = int(self.counters[SAMPLES]), time.perf_counter()
+            self._grow(min(max_samples, before + portion), began + 2.0 * PAUSE)
+            elapsed = max(time.perf_counter() - began, 1e-6)
+            done = int(self.counters[SAMPLES]) - before
+            portion = int(min(max(16, done * PAUSE / elapsed), 4 * portion))
+
+    def _grow(self, last_sample: int, deadline: float) -> None:
+        """Run the loop up to a number of samples, or until the deadline passes while FCL is asked."""
+        t, m = self._tree, self._map
+        answered, asked_at = 0, -1
+        while True:
+            status = grow(
+                *t,
+                self._index.heads,
+                self._index.occupied,
+                self._stack,
+                self._kind,
+                self._index.cell,
+                self.model,
+                self._goal_bias,
+                m.children,
+                m.clearances,
+                m.frame,
+                self._draws,
+                self._buffer,
+                m.answers,
+                answered,
+                self.counters,
+                last_sample,
+                self._question,
+            )
+            if status == WANT_ANSWER:
+                now_at = int(self.counters[SAMPLES])
+                answered = m.answer(answered if now_at == asked_at else 0, *self._question.tolist())
+                asked_at = now_at
+                if time.perf_counter() > deadline and not answered:
+                    return
+            elif status == WANT_DRAWS:
+                self._draws = self._rng.random((DRAWS_AT_ONCE, DRAWS))
+                self.counters[DRAWN] = 0
+            elif status == WANT_ROOM:
+                self._make_room()
+                t = self._tree
+            else:
+                self.has_reached_goal = status == REACHED
+                return
+
+    def _make_room(self) -> None:
+        """Double the arrays and enter the nodes into a finer index."""
+        count, capacity = int(self.counters[NODES]), 2 * len(self._tree.states)
+        larger = _tree_arrays(capacity, self._is_closed_loop)
+        for old, new in zip(self._tree, larger, strict=True):
+            new[: len(old)] = old
+        depth = int(self._index.occupied[0])
+        self._tree = larger
+        self._make_index(capacity, depth)
+        rebuild_index(larger, self._index, count)
+
+    def _make_index(self, capacity: int, depth: int = 0) -> None:
+        """An empty index with about one cell a node."""
+        x0, y0, x1, y1 = self._map.frame[:4].tolist()
+        cell = math.sqrt((x1 - x0) * (y1 - y0) / capacity)
+        shape = (1, 1)
+        if self._kind == GRID:
+            shape = (math.ceil((y1 - y0) / cell), math.ceil((x1 - x0) / cell))
+        heads = np.full(shape, -1, dtype=np.int32)
+        limits = [2**31, -1, 2**31, -1, 0] if self._kind == GRID else [0, 0, 0, 0, 0]
+        occupied = np.array(limits, dtype=np.int64)
+        self._index = Index(self._kind, self._tree.states, self._tree.links, heads, occupied, x0, y0, cell)
+        self._stack = np.empty((2 * depth + 64 if self._kind == KD_TREE else 0, 3))
+
+    @property
+    def nodes(self) -> int:
+        """Nodes of the tree."""
+        return int(self.counters[NODES])
+
+    def edges(self) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+        """States (n, 5), parents (n,), controls (n, 3) and steps (n,) of all nodes."""
+        n, t = self.nodes, self._tree
+        controls = t.references[:n] if self._is_closed_loop else np.pad(t.commands[:n], ((0, 0), (0, 1)))
+        return t.states[:n], t.parents[:n].astype(np.int64), controls, t.steps[:n].astype(np.int64)
+
+    def path_to(self, node: int) -> list[int]:
+        """Nodes from a root to a node."""
+        path = [node]
+        while self._tree.parents[path[-1]] >= 0:
+            path.append(int(self._tree.parents[path[-1]]))
+        return path[::-1]
+
+    def trajectory(self) -> Trajectory:
+        """The way from the root to the node that was added last."""
+        path = self.path_to(self.nodes - 1)
+        states, _, controls, steps = self.edges()
+        return trajectory_from_controls(states[path[0]], controls[path[1:]], steps[path[1:]], self.model)
+
+    def tree(self) -> Tree:
+        """All nodes, with the way along every edge."""
+        return tree_from_controls(*self.edges(), self.model)
+
+
+def _tree_arrays(capacity: int, is_closed_loop: bool) -> TreeArrays:
+    """Arrays for some nodes; their contents are undefined."""
+    return TreeArrays(
+        states=np.empty((capacity, 5)),
+        commands=np.zeros((capacity, 2)),
+        references=np.zeros((capacity if is_closed_loop else 0, 3)),
+        links=np.empty((capacity, 2), dtype=np.int32),
+        parents=np.empty(capacity, dtype=np.int32),
+        steps=np.empty(capacity, dtype=np.int32),
+        first_child=np.empty(capacity, dtype=np.int32),
+        siblings=np.empty(capacity, dtype=np.int32),
+        twins=np.empty(capacity, dtype=np.int32),
+        places=np.empty(capacity, dtype=np.int32),
+    )

@@ -1,0 +1,101 @@
+"""One plan by a planner that OMPL runs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+from cbrrt_ompl.clearance_map import clearance_map_for
+from cbrrt_ompl.ompl_plugin.binding import ob, ou
+from cbrrt_ompl.ompl_plugin.results import trajectory_from_path, tree_from_planner
+from cbrrt_ompl.ompl_plugin.setup import make_equipped_setup
+from cbrrt_ompl.scenario import Scenario
+from cbrrt_ompl.trajectory import Trajectory
+from cbrrt_ompl.tree import Tree
+
+
+class Found(NamedTuple):
+    """What OMPL's planner came back with."""
+
+    trajectory: Trajectory | None
+    """Into the goal region; None where it was not reached."""
+    nodes: int
+    """Nodes of the tree."""
+    samples: int
+    """Samples drawn, or rounds of the main loop of OMPL's own planners."""
+    planning_time: float
+    """Time of ``solve`` [s]."""
+    make_tree: Callable[[], Tree]
+    """Makes the tree out of the planner's memory."""
+
+
+def run(
+    scenario: Scenario,
+    planner: str,
+    seed: int | None,
+    on_start: Callable[[], None],
+    should_stop: Callable[[int], bool],
+) -> Found:
+    """Set a planner up and let it solve the scenario.
+
+    Args:
+        scenario: world, robot, start, goal and settings; its ``max_samples`` is obeyed.
+        planner: a name that :func:`cbrrt_ompl.ompl_plugin.setup.make_setup` knows.
+        seed: 0 or more, or None for a fresh one.
+        on_start: called when the search begins.
+        should_stop: called once a round of the planner's main loop, with the rounds so far.
+    """
+    with quiet_ompl():
+        if seed is not None:
+            # OMPL complains about a second seed in a process; yet all that is random below is allocated from here on
+            ou.RNG.setSeed(seed + 1)
+        clearance_map = clearance_map_for(scenario.world, scenario.robot.footprint)
+        setup, equipment = make_equipped_setup(scenario, planner, clearance_map)
+        setup.setup()
+        rounds = _Rounds(scenario.planning.max_samples, should_stop)
+        condition = ob.PlannerTerminationCondition(ob.PlannerTerminationConditionFn(rounds))
+        on_start()
+        began = time.perf_counter()
+        setup.solve(condition)
+        planning_time = time.perf_counter() - began
+        space, si = setup.getStateSpace(), setup.getSpaceInformation()
+        trajectory = None
+        if setup.haveExactSolutionPath():
+            trajectory = trajectory_from_path(setup.getSolutionPath(), space, equipment.model)
+        data = ob.PlannerData(si)
+        setup.getPlanner().getPlannerData(data)
+    return Found(
+        trajectory,
+        nodes=data.numVertices(),
+        samples=rounds.count if equipment.sampler is None else equipment.sampler.samples,
+        planning_time=planning_time,
+        make_tree=lambda: tree_from_planner(setup.getPlanner(), si, space, equipment.model),
+    )
+
+
+class _Rounds:
+    """OMPL's termination condition: counts the rounds of the main loop."""
+
+    def __init__(self, limit: int, should_stop: Callable[[int], bool]) -> None:
+        self.count = 0
+        self._limit = limit
+        self._should_stop = should_stop
+
+    def __call__(self) -> bool:
+        if self.count >= self._limit or self._should_stop(self.count):
+            return True
+        self.count += 1
+        return False
+
+
+@contextmanager
+def quiet_ompl() -> Iterator[Any]:
+    """Keep OMPL's log off the caller's terminal."""
+    level = ou.getLogLevel()
+    ou.setLogLevel(ou.LOG_NONE)
+    try:
+        yield
+    finally:
+        ou.setLogLevel(level)
