@@ -1,0 +1,230 @@
+"""A planning problem: world, robot, start, goal and settings, checked together; read from and written to YAML."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from cbrrt_ompl.errors import InputError, Problem, ScenarioError
+from cbrrt_ompl.robot import Limits, Robot
+from cbrrt_ompl.scenario_file import MapSource, read_parts, scenario_data
+from cbrrt_ompl.sections import Report
+from cbrrt_ompl.settings import Goal, PlanningSettings, State
+from cbrrt_ompl.world import World
+
+HORIZON_TOLERANCE = 0.01
+"""Share of the horizon that rounding it to whole steps may add or take away."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Scenario:
+    """What to plan: the paper's robot and settings unless others are given.
+
+    Raises:
+        ScenarioError: with every reason why nobody could plan in it.
+    """
+
+    name: str
+    """Name in figures and tables: one line of text."""
+    world: World
+    """Bounds and obstacles."""
+    robot: Robot = Robot()
+    """Footprint, limits and gains."""
+    start: State
+    """Where the robot starts, and how fast it is."""
+    goal: Goal
+    """Where it is to arrive."""
+    planning: PlanningSettings = PlanningSettings()
+    """Settings of the planners."""
+    map: MapSource | None = None
+    """The map that the first obstacles of the world came from, if any."""
+
+    def __post_init__(self) -> None:
+        """Check that the parts fit each other."""
+        problems = find_problems({field.name: getattr(self, field.name) for field in fields(self)})
+        if problems:
+            raise ScenarioError(problems)
+
+    def __eq__(self, other: object) -> bool:
+        """Equal where all numbers are; worlds count by their bounds and obstacles."""
+        if not isinstance(other, Scenario):
+            return NotImplemented
+        return self._key() == other._key()
+
+    def __hash__(self) -> int:
+        """Hash of all parts."""
+        return hash(self._key())
+
+    def _key(self) -> tuple[Any, ...]:
+        world = (self.world.bounds, self.world.obstacles)
+        return self.name, world, self.robot, self.start, self.goal, self.planning, self.map
+
+
+def load_scenario(path: str | Path) -> Scenario:
+    """Scenario from a YAML file.
+
+    Args:
+        path: the file; see the page on scenario files for its keys.
+
+    Returns:
+        The scenario, checked.
+
+    Raises:
+        ScenarioError: with every mistake in the file, one line each.
+    """
+    from cbrrt_ompl.plain_yaml import read_yaml
+
+    report = Report()
+    try:
+        data = read_yaml(Path(path), report.problems)
+    except InputError as error:
+        raise ScenarioError(error.problems, str(path)) from None
+    return _make(data, str(path), Path(path).parent, report)
+
+
+def save_scenario(scenario: Scenario, path: str | Path) -> None:
+    """Write a scenario to a YAML file, from which :func:`load_scenario` makes an equal one.
+
+    Args:
+        scenario: what to write.
+        path: the file, overwritten if there is one; a map is referred to relative to its folder.
+
+    Raises:
+        ScenarioError: if the file cannot be written.
+    """
+    from cbrrt_ompl.plain_yaml import Remark, dump_line
+
+    lines = []
+    for key, value in scenario_to_dict(scenario, Path(path).parent).items():
+        if key == "obstacles" and value:
+            lines += [f"{key}:", *(f"  - {{{dump_line(obstacle)}}}" for obstacle in value)]
+        elif key == "robot":
+            lines += [f"{key}:", *(f"  {dump_line({part: content})}" for part, content in value.items())]
+        else:
+            lines.append(dump_line({key: value}))
+    try:
+        Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    except OSError as error:
+        problem = Problem("", Remark(error.strerror or str(error)), "a file that can be written")
+        raise ScenarioError(problem, str(path)) from None
+
+
+def scenario_from_dict(data: Mapping[str, Any], source: str = "scenario", folder: Path | None = None) -> Scenario:
+    """Scenario from plain values with the keys of a scenario file.
+
+    Args:
+        data: the values.
+        source: what messages call them.
+        folder: what the file of a map is relative to; the current one if not given.
+
+    Returns:
+        The scenario, checked.
+
+    Raises:
+        ScenarioError: with every mistake in the values, one line each.
+    """
+    return _make(data, source, folder or Path(), Report())
+
+
+def scenario_to_dict(scenario: Scenario, folder: Path | None = None) -> dict[str, Any]:
+    """Plain values with the keys of a scenario file, angles in radians.
+
+    Args:
+        scenario: what to describe.
+        folder: what the file of a map is to be relative to; the current one if not given.
+
+    Returns:
+        Mappings, lists, texts and numbers that :func:`scenario_from_dict` makes an equal scenario of.
+    """
+    return scenario_data(scenario, (folder or Path()).resolve())
+
+
+def find_problems(parts: Mapping[str, Any]) -> list[Problem]:
+    """Why nobody could plan with some parts of a scenario.
+
+    Args:
+        parts: the attributes of a scenario by name; those that are missing are not checked.
+
+    Returns:
+        One entry a reason.
+    """
+    robot, start, goal, planning = (parts.get(name) for name in ("robot", "start", "goal", "planning"))
+    world = parts.get("world")
+    found = list(_name_problems(parts["name"])) if "name" in parts else []
+    if start is not None:
+        found += _start_problems(start, world, robot)
+    if goal is not None and world is not None:
+        found += _goal_problems(goal, world, robot)
+    if planning is not None:
+        found += _horizon_problems(planning)
+    return found
+
+
+def _make(data: object, source: str, folder: Path, report: Report) -> Scenario:
+    """Scenario from plain values, or every mistake in them and in what they add up to."""
+    parts = read_parts(data, folder, report)
+    if isinstance(data, Mapping):
+        defaults = {"robot": Robot(), "planning": PlanningSettings()}
+        report.adopt(find_problems({**{k: v for k, v in defaults.items() if k not in data}, **parts}))
+    if report.problems:
+        raise ScenarioError(report.problems, source)
+    return Scenario(**parts)
+
+
+def _name_problems(name: str) -> Iterator[Problem]:
+    if not (isinstance(name, str) and name.strip() and name.isprintable()):
+        yield Problem("name", name, "one line of text")
+
+
+def _start_problems(start: State, world: World | None, robot: Robot | None) -> Iterator[Problem]:
+    """Why the robot cannot start from a state."""
+    infinite = [name for name, value in start._asdict().items() if not math.isfinite(value)]
+    yield from (Problem(f"start.{name}", getattr(start, name), "a finite number") for name in infinite)
+    if infinite:
+        return
+    if robot is not None:
+        yield from _velocity_problems(start, robot.limits)
+    if world is None:
+        return
+    if not world.bounds.contains(start.x, start.y):
+        yield Problem(
+            "start", [start.x, start.y], f"a position inside the bounds {world.bounds.min}, {world.bounds.max}"
+        )
+    elif robot is not None and world.collides(robot.footprint, start[:3]):
+        yield Problem("start", list(start[:3]), "a pose where the footprint touches no obstacle and no bound")
+
+
+def _velocity_problems(start: State, limits: Limits) -> Iterator[Problem]:
+    """Which start velocities the robot cannot have."""
+    for name, unit in (("v", "m/s"), ("omega", "rad/s")):
+        low, high = getattr(limits, f"{name}_min"), getattr(limits, f"{name}_max")
+        if not low <= getattr(start, name) <= high:
+            expected = f"{low:.6g} to {high:.6g} {unit}, robot.limits.{name}"
+            yield Problem(f"start.{name}", getattr(start, name), expected)
+
+
+def _goal_problems(goal: Goal, world: World, robot: Robot | None) -> Iterator[Problem]:
+    """Why no state of the goal region can be reached."""
+    if not world.bounds.contains(goal.x, goal.y):
+        yield Problem("goal", [goal.x, goal.y], f"a position inside the bounds {world.bounds.min}, {world.bounds.max}")
+    elif robot is not None and not _may_be_free(goal, world, robot):
+        yield Problem("goal", [goal.x, goal.y], "a region with room for the robot: all of it is in collision")
+
+
+def _may_be_free(goal: Goal, world: World, robot: Robot) -> bool:
+    """Whether the goal region may hold a free position; False only where certainly none is."""
+    radius = robot.footprint.inscribed_radius
+    if radius == 0.0 and robot.footprint.vertices is not None:
+        return True  # the robot's origin may stand in an obstacle that the footprint passes beside
+    return world.signed_clearance(goal.x, goal.y) + goal.tolerance > radius
+
+
+def _horizon_problems(planning: PlanningSettings) -> Iterator[Problem]:
+    """Whether rounding to whole steps changes the horizon by more than is fair."""
+    duration = planning.steps * planning.step
+    if abs(duration - planning.horizon) > HORIZON_TOLERANCE * planning.horizon:
+        expected = f"a multiple of planning.step ({planning.step:g} s)"
+        yield Problem("planning.horizon", planning.horizon, expected)
