@@ -60,6 +60,10 @@ class WorldError(InputError):
     """An obstacle, a bound or a footprint that describes no solid."""
 
 
+class MapError(InputError):
+    """A map that cannot be read, or that holds no world."""
+
+
 class RobotError(InputError):
     """A limit, a gain or a footprint that no robot can have."""
 

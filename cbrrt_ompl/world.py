@@ -2,25 +2,57 @@
 
 The plane is the plane z = 0 of FCL's space. A disc becomes a sphere, a box a tall box, a polygon its flat triangles,
 each centred on that plane, so that every answer in the plane is FCL's answer in space. FCL answers in closed form where
-one shape is a sphere, and else by GJK, to well below the micrometre of `CONTACT_TOLERANCE`. (Flat triangles on purpose:
-between `fcl.Convex` and `fcl.BVHModel`, FCL 0.7 overestimates distances by decimetres.)
+one shape is a sphere, and else by GJK, to well below the micrometre of `CONTACT_TOLERANCE`. (Tall boxes and flat
+triangles on purpose: FCL 0.7 overestimates the distance of a triangle from a box that is low for its distance by
+centimetres, and between `fcl.Convex` and `fcl.BVHModel` by decimetres.)
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any, TypeAlias
+from functools import cached_property
+from typing import Any
 
 import fcl
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from cbrrt_ompl.errors import Problem, WorldError
-from cbrrt_ompl.robot import Footprint, counter_clockwise_ring
+from cbrrt_ompl.errors import MISSING, Problem, WorldError
+from cbrrt_ompl.obstacles import (
+    MAX_COORDINATE,
+    Bounds,
+    Box,
+    Disc,
+    Obstacle,
+    OrientedBox,
+    Polygon,
+    polygons_from_shapely,
+)
+from cbrrt_ompl.occupancy import (
+    FREE_THRESHOLD,
+    OCCUPIED_THRESHOLD,
+    blocked_cells,
+    cells_from,
+    grid_bounds,
+    grid_obstacles,
+)
+from cbrrt_ompl.robot import Footprint
+
+__all__ = [
+    "CONTACT_TOLERANCE",
+    "MAX_COORDINATE",
+    "MITRE_LIMIT",
+    "Bounds",
+    "Box",
+    "CollisionChecker",
+    "Disc",
+    "Obstacle",
+    "OrientedBox",
+    "Polygon",
+    "World",
+]
 
 CONTACT_TOLERANCE = 1e-6
 """Every footprint is grown by this much, so that touching counts as collision whatever the rounding [m]."""
@@ -49,10 +81,65 @@ class World:
         """
         self.bounds = bounds
         self.obstacles: tuple[Obstacle, ...] = tuple(obstacles)
-        height = 4.0 * (max(bounds.size) + max((_extent(o) for o in self.obstacles), default=0.0))
-        solids: list[Obstacle] = [*bounds.walls(), *self.obstacles]
-        self._solids = _manager([_solid(o, height) for o in solids])
-        self._boundaries = [(o, _boundary(o, height)) for o in self.obstacles if isinstance(o, Polygon)]
+        height = 4.0 * (max(bounds.size) + max(map(_extent, self.obstacles), default=0.0))
+        self._solids = _manager([_solid(o, height) for o in (*bounds.walls(), *self.obstacles)])
+        self._checkers: dict[Footprint, CollisionChecker] = {}
+
+    @classmethod
+    def from_grid(
+        cls,
+        grid: ArrayLike,
+        resolution: float,
+        origin: Sequence[float] = (0.0, 0.0, 0.0),
+        *,
+        unknown: str = "occupied",
+        occupied_thresh: float = OCCUPIED_THRESHOLD,
+        free_thresh: float = FREE_THRESHOLD,
+    ) -> World:
+        """World of an occupancy grid; its first row is the lowest, as in a ROS OccupancyGrid.
+
+        An image has its first row at the top: flip it with ``grid[::-1]``. The cell in row r and column c covers
+        x from c to c + 1 and y from r to r + 1 times the resolution, in the frame of the origin.
+
+        Args:
+            grid: shape (rows, columns): whether a cell is occupied as bool, 0 or 1; or how likely it is, from 0 to 1,
+                NaN where nobody knows; or the whole numbers of ROS: -1 unknown, else 0 to 100 percent.
+            resolution: side of a cell [m].
+            origin: pose (x, y, yaw) of the lower left corner of the grid, [m, m, rad]; where the grid is rotated, the
+                world is the rectangle around it, blocked outside of the grid.
+            unknown: whether cells that are neither occupied nor free are ``occupied`` or ``free``.
+            occupied_thresh: cells more likely than this are occupied.
+            free_thresh: cells less likely than this are free.
+
+        Returns:
+            The world, with the blocked cells merged into boxes.
+
+        Raises:
+            MapError: if these are no such values, or no cell is free.
+        """
+        blocked = blocked_cells(cells_from(grid, occupied_thresh, free_thresh), unknown)
+        obstacles = grid_obstacles(blocked, resolution, origin)
+        return cls(grid_bounds(blocked.shape, resolution, origin), obstacles)
+
+    @classmethod
+    def from_shapely(cls, geometry: object, bounds: Bounds | None = None) -> World:
+        """World whose obstacles are the area of a shapely geometry.
+
+        Args:
+            geometry: a polygon, a multipolygon or a collection of such, or several in a list; in metres.
+            bounds: the walls; the rectangle around the geometry if not given.
+
+        Raises:
+            WorldError: if a part of the geometry has no area, or it is empty and there are no bounds either.
+        """
+        obstacles = polygons_from_shapely(geometry)
+        if bounds is None:
+            if not obstacles:
+                raise WorldError(Problem("bounds", MISSING, "bounds, where the geometry is empty"))
+            corners = np.concatenate([o.vertices for o in obstacles])  # (n, 2)
+            (x0, y0), (x1, y1) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+            bounds = Bounds((x0, y0), (x1, y1))
+        return cls(bounds, obstacles)
 
     def collides(self, footprint: Footprint, pose: ArrayLike) -> bool:
         """Whether a footprint at a pose touches an obstacle or a wall: FCL's answer.
@@ -97,7 +184,13 @@ class World:
 
     def checker(self, footprint: Footprint) -> CollisionChecker:
         """The checker for one footprint, made once and kept."""
-        return _checker(self, footprint)
+        if footprint not in self._checkers:
+            self._checkers[footprint] = CollisionChecker(self, footprint)
+        return self._checkers[footprint]
+
+    @cached_property
+    def _polygons(self) -> _Polygons:
+        return _Polygons([o for o in self.obstacles if isinstance(o, Polygon)])
 
 
 class CollisionChecker:
@@ -112,7 +205,7 @@ class CollisionChecker:
         self.queries = 0
         self._bounds = world.bounds
         self._solids = world._solids
-        self._boundaries = world._boundaries
+        self._polygons = world._polygons
         self._grown = fcl.CollisionObject(_footprint_geometry(footprint, CONTACT_TOLERANCE))
         self._exact = fcl.CollisionObject(_footprint_geometry(footprint, 0.0))
         self._translation = np.zeros(3)
@@ -128,9 +221,13 @@ class CollisionChecker:
             r[0, 0], r[0, 1], r[1, 0], r[1, 1] = c, -s, s, c
         footprint.setTransform(fcl.Transform(self._rotation, self._translation))
 
+    def _is_pose(self, x: float, y: float, theta: float) -> bool:
+        """Whether the position is inside the bounds, and the heading a number where it matters."""
+        return self._bounds.contains(x, y) and (self._is_round or math.isfinite(theta))
+
     def collides(self, x: float, y: float, theta: float) -> bool:
         """Whether the footprint touches a solid at this pose [m, m, rad]."""
-        if not self._bounds.contains(x, y):  # also what NaN and infinity come to
+        if not self._is_pose(x, y, theta):
             return True
         self.queries += 1
         self._move(self._grown, x, y, theta)
@@ -158,7 +255,7 @@ class CollisionChecker:
         Returns:
             Its clearance less the contact tolerance [m]; 0 exactly where :meth:`collides` is true.
         """
-        if not self._bounds.contains(x, y):
+        if not self._is_pose(x, y, theta):
             return 0.0
         self.queries += 1
         self._move(self._exact, x, y, theta)
@@ -179,30 +276,48 @@ class CollisionChecker:
         self._solids.collide(point, contacts, fcl.defaultCollisionCallback)
         touched = contacts.result.contacts
         depth = max((c.penetration_depth for c in touched if not isinstance(c.o1, fcl.BVHModel)), default=0.0)
-        here = shapely.Point(x, y)
-        for polygon, boundary in self._boundaries:
-            if polygon.to_shapely().contains(here):
-                depth = max(depth, fcl.distance(point, boundary))
+        for boundary in self._polygons.boundaries_around(x, y):
+            depth = max(depth, fcl.distance(point, boundary))
         return -float(depth)
 
 
-@lru_cache(maxsize=32)
-def _checker(world: World, footprint: Footprint) -> CollisionChecker:
-    return CollisionChecker(world, footprint)
+class _Polygons:
+    """The polygons of a world, found by a point inside."""
 
+    def __init__(self, polygons: Sequence[Polygon]) -> None:
+        self._polygons = polygons
+        self._tree = shapely.STRtree([polygon.to_shapely() for polygon in polygons])
+        self._boundaries: dict[int, Any] = {}
 
-def _extent(obstacle: Obstacle) -> float:
-    """Longer side of the rectangle around an obstacle [m]."""
-    x0, y0, x1, y1 = obstacle.to_shapely().bounds
-    return max(x1 - x0, y1 - y0)
+    def boundaries_around(self, x: float, y: float) -> list[Any]:
+        """FCL objects of the borders of all polygons that a point is inside of."""
+        if not self._polygons:
+            return []
+        indices = self._tree.query(shapely.Point(x, y), predicate="within").tolist()
+        for i in indices:
+            if i not in self._boundaries:
+                self._boundaries[i] = _boundary(self._polygons[i])
+        return [self._boundaries[i] for i in indices]
 
 
 def _manager(objects: list[Any]) -> Any:
     """A broad-phase tree over FCL objects."""
     manager = fcl.DynamicAABBTreeCollisionManager()
+    manager.tree_init_level = 1  # by Morton codes; the default splits tall boxes by height, where nothing is apart
     manager.registerObjects(objects)
     manager.setup()
     return manager
+
+
+def _extent(obstacle: Obstacle) -> float:
+    """About the longest side of an obstacle [m]."""
+    if isinstance(obstacle, Box):
+        return max(obstacle.max[0] - obstacle.min[0], obstacle.max[1] - obstacle.min[1])
+    if isinstance(obstacle, OrientedBox):
+        return max(obstacle.size)
+    if isinstance(obstacle, Disc):
+        return 2.0 * obstacle.radius
+    return float(np.ptp(obstacle.vertices, axis=0).max())
 
 
 def _solid(obstacle: Obstacle, height: float) -> Any:
@@ -211,20 +326,28 @@ def _solid(obstacle: Obstacle, height: float) -> Any:
         (x0, y0), (x1, y1) = obstacle.min, obstacle.max
         place = fcl.Transform(np.array([0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.0]))
         return fcl.CollisionObject(fcl.Box(x1 - x0, y1 - y0, height), place)
+    if isinstance(obstacle, OrientedBox):
+        c, s = math.cos(obstacle.angle), math.sin(obstacle.angle)
+        rotation = np.array([(c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)])
+        place = fcl.Transform(rotation, np.array([*obstacle.center, 0.0]))
+        return fcl.CollisionObject(fcl.Box(*obstacle.size, height), place)
     if isinstance(obstacle, Disc):
         place = fcl.Transform(np.array([*obstacle.center, 0.0]))
         return fcl.CollisionObject(fcl.Sphere(obstacle.radius), place)
     return fcl.CollisionObject(_flat_mesh(obstacle.to_shapely()))
 
 
-def _boundary(polygon: Polygon, height: float) -> Any:
+def _boundary(polygon: Polygon) -> Any:
     """FCL object of a polygon's border alone: an upright wall of no thickness along every edge."""
+    height = _extent(polygon)
     faces = []
     for ring in (polygon.vertices, *polygon.holes):
-        for (ax, ay), (bx, by) in zip(ring, np.roll(ring, -1, axis=0), strict=True):
-            low_a, low_b, high_a, high_b = ((x, y, z) for z in (-height, height) for x, y in ((ax, ay), (bx, by)))
-            faces += [low_a, low_b, high_b, low_a, high_b, high_a]
-    return fcl.CollisionObject(_mesh(np.array(faces)))
+        ends = np.roll(ring, -1, axis=0)
+        low_a, low_b, high_a, high_b = (
+            np.column_stack([corners, np.full(len(ring), z)]) for z in (-height, height) for corners in (ring, ends)
+        )
+        faces.append(np.stack([low_a, low_b, high_b, low_a, high_b, high_a], axis=1).reshape(-1, 3))  # (6 n, 3)
+    return fcl.CollisionObject(_mesh(np.concatenate(faces)))
 
 
 def _mesh(corners: NDArray[np.float64]) -> Any:

@@ -1,0 +1,250 @@
+"""What may stand in a world: boxes, discs and polygons, and the bounds around them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from cbrrt_ompl.errors import Problem, WorldError
+from cbrrt_ompl.robot import counter_clockwise_ring
+
+MAX_COORDINATE = 1e6
+"""Largest coordinate of a world [m]: beyond it the contact tolerance would drown in rounding."""
+
+_COORDINATES = f"finite coordinates of at most {MAX_COORDINATE:g} m"
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """The rectangle that the whole footprint must stay in; its sides are walls.
+
+    Raises:
+        WorldError: if a corner is not finite or the rectangle has no area.
+    """
+
+    min: tuple[float, float]
+    """Lower left corner [m]."""
+    max: tuple[float, float]
+    """Upper right corner [m]."""
+
+    def __post_init__(self) -> None:
+        """Check the corners."""
+        problems = _rectangle_problems("bounds", self.min, self.max)
+        if problems:
+            raise WorldError(problems)
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height [m]."""
+        return self.max[0] - self.min[0], self.max[1] - self.min[1]
+
+    def contains(self, x: float, y: float) -> bool:
+        """Whether a point lies strictly inside."""
+        return self.min[0] < x < self.max[0] and self.min[1] < y < self.max[1]
+
+    def walls(self) -> list[Box]:
+        """Four solid walls around the rectangle, as thick as it is wide."""
+        (x0, y0), (x1, y1) = self.min, self.max
+        d = max(self.size)
+        return [
+            Box((x0 - d, y0 - d), (x0, y1 + d)),
+            Box((x1, y0 - d), (x1 + d, y1 + d)),
+            Box((x0 - d, y0 - d), (x1 + d, y0)),
+            Box((x0 - d, y1), (x1 + d, y1 + d)),
+        ]
+
+
+@dataclass(frozen=True)
+class Box:
+    """A solid rectangle along the axes.
+
+    Raises:
+        WorldError: if a corner is not finite or the rectangle has no area.
+    """
+
+    min: tuple[float, float]
+    """Lower left corner [m]."""
+    max: tuple[float, float]
+    """Upper right corner [m]."""
+
+    def __post_init__(self) -> None:
+        """Check the corners."""
+        problems = _rectangle_problems("box", self.min, self.max)
+        if problems:
+            raise WorldError(problems)
+
+    def to_shapely(self) -> shapely.Polygon:
+        """The same area as a shapely polygon."""
+        return shapely.box(*self.min, *self.max)
+
+
+@dataclass(frozen=True)
+class OrientedBox:
+    """A solid rectangle at an angle.
+
+    Raises:
+        WorldError: if a number is not finite or a side not above 0.
+    """
+
+    center: tuple[float, float]
+    """Centre [m]."""
+    size: tuple[float, float]
+    """Sides along its own axes [m]."""
+    angle: float
+    """Direction of its first side, counter-clockwise from the x axis [rad]."""
+
+    def __post_init__(self) -> None:
+        """Check centre, sides and angle."""
+        problems = []
+        if not all(_is_coordinate(c) for c in self.center):
+            problems.append(Problem("oriented_box.center", self.center, _COORDINATES))
+        if not all(0.0 < side <= MAX_COORDINATE for side in self.size):
+            problems.append(Problem("oriented_box.size", self.size, "two sides above 0 [m]"))
+        if not math.isfinite(self.angle):
+            problems.append(Problem("oriented_box.angle", self.angle, "a finite angle [rad]"))
+        if problems:
+            raise WorldError(problems)
+
+    @property
+    def vertices(self) -> NDArray[np.float64]:
+        """Corners, counter-clockwise, shape (4, 2) [m]."""
+        c, s = math.cos(self.angle), math.sin(self.angle)
+        halves = 0.5 * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]) * self.size
+        return np.array(self.center) + halves @ np.array([(c, s), (-s, c)])
+
+    @property
+    def holes(self) -> tuple[NDArray[np.float64], ...]:
+        """None: with its vertices, a box can stand for the polygon of the same area."""
+        return ()
+
+    def to_shapely(self) -> shapely.Polygon:
+        """The same area as a shapely polygon."""
+        return shapely.Polygon(self.vertices)
+
+
+@dataclass(frozen=True)
+class Disc:
+    """A solid disc.
+
+    Raises:
+        WorldError: if the centre is not finite or the radius not above 0.
+    """
+
+    center: tuple[float, float]
+    """Centre [m]."""
+    radius: float
+    """Radius [m]."""
+
+    def __post_init__(self) -> None:
+        """Check centre and radius."""
+        problems = []
+        if not all(_is_coordinate(c) for c in self.center):
+            problems.append(Problem("disc.center", self.center, _COORDINATES))
+        if not (0.0 < self.radius <= MAX_COORDINATE):
+            problems.append(Problem("disc.radius", self.radius, "a radius above 0 [m]"))
+        if problems:
+            raise WorldError(problems)
+
+    def to_shapely(self) -> shapely.Polygon:
+        """The disc as a shapely polygon of 256 sides."""
+        return shapely.Point(self.center).buffer(self.radius, quad_segs=64)
+
+
+@dataclass(frozen=True, eq=False)
+class Polygon:
+    """A solid simple polygon, convex or not, with holes if need be.
+
+    Raises:
+        WorldError: if the rings cross themselves or each other, or enclose no area.
+    """
+
+    vertices: NDArray[np.float64]
+    """Corners, counter-clockwise, shape (n, 2) [m]."""
+    holes: tuple[NDArray[np.float64], ...] = ()
+    """Rings that are cut out, each of shape (m, 2) [m]."""
+
+    def __post_init__(self) -> None:
+        """Check and freeze the rings."""
+        object.__setattr__(self, "vertices", counter_clockwise_ring(self.vertices, "polygon.vertices"))
+        holes = tuple(counter_clockwise_ring(h, f"polygon.holes[{i}]") for i, h in enumerate(self.holes))
+        object.__setattr__(self, "holes", holes)
+        if float(np.abs(self.vertices).max()) > MAX_COORDINATE:
+            raise WorldError(Problem("polygon.vertices", self.vertices.tolist(), _COORDINATES))
+        shape = self.to_shapely()
+        if not shape.is_valid:
+            reason = shapely.is_valid_reason(shape).lower()
+            raise WorldError(Problem("polygon.holes", len(holes), f"holes apart from each other and inside ({reason})"))
+
+    def __eq__(self, other: object) -> bool:
+        """Equal where all rings are, corner for corner."""
+        if not isinstance(other, Polygon):
+            return NotImplemented
+        mine, theirs = (self.vertices, *self.holes), (other.vertices, *other.holes)
+        return len(mine) == len(theirs) and all(np.array_equal(a, b) for a, b in zip(mine, theirs, strict=True))
+
+    def __hash__(self) -> int:
+        """Hash of the outer ring."""
+        return hash(self.vertices.tobytes())
+
+    def to_shapely(self) -> shapely.Polygon:
+        """The same area as a shapely polygon."""
+        return shapely.Polygon(self.vertices, self.holes)
+
+
+Obstacle: TypeAlias = Box | OrientedBox | Disc | Polygon
+"""What may stand in a world."""
+
+
+def polygons_from_shapely(geometry: object) -> list[Polygon]:
+    """Obstacles of the area of a shapely geometry.
+
+    Args:
+        geometry: a polygon, a multipolygon or a collection of such, or several in a sequence; coordinates in metres.
+
+    Returns:
+        One polygon with its holes for every polygon in it; empty ones have none.
+
+    Raises:
+        WorldError: if a part has no area (points and lines do not) or is not valid.
+    """
+    return [
+        Polygon(_ring(part.exterior), tuple(_ring(hole) for hole in part.interiors)) for part in _polygons(geometry)
+    ]
+
+
+def _polygons(geometry: object) -> Iterator[shapely.Polygon]:
+    """The polygons in a geometry that are not empty."""
+    if isinstance(geometry, shapely.Polygon):
+        if not geometry.is_empty:
+            yield geometry
+    elif isinstance(geometry, shapely.MultiPolygon | shapely.GeometryCollection):
+        for part in geometry.geoms:
+            yield from _polygons(part)
+    elif isinstance(geometry, list | tuple | np.ndarray):
+        for part in geometry:
+            yield from _polygons(part)
+    else:
+        raise WorldError(Problem("geometry", geometry, "polygons; give points and lines an area with shapely.buffer"))
+
+
+def _ring(ring: shapely.LinearRing) -> NDArray[np.float64]:
+    return shapely.get_coordinates(ring)  # (n, 2)
+
+
+def _is_coordinate(value: float) -> bool:
+    return abs(value) <= MAX_COORDINATE  # False for NaN
+
+
+def _rectangle_problems(name: str, low: Sequence[float], high: Sequence[float]) -> list[Problem]:
+    """What is wrong with the rectangle from low to high."""
+    if not all(_is_coordinate(c) for c in (*low, *high)):
+        return [Problem(name, [list(low), list(high)], _COORDINATES)]
+    if not (low[0] < high[0] and low[1] < high[1]):
+        return [Problem(name, [list(low), list(high)], "min below max in x and in y")]
+    return []
