@@ -211,7 +211,6 @@ def test_a_pose_that_is_no_place_collides(pose: tuple[float, float, float]) -> N
         assert MIXED.clearance(footprint, pose) == 0.0
 
 
-@pytest.mark.xfail(reason="the checker does not look at the heading before it asks FCL")
 @pytest.mark.parametrize("theta", [math.nan, math.inf])
 def test_a_heading_that_is_no_angle_collides_where_the_heading_matters(theta: float) -> None:
     assert World(BOUNDS).collides(FOOTPRINTS["rectangle"], (0.0, 0.0, theta))
