@@ -20,6 +20,9 @@ from cbrrt_ompl.verification import verify
 TIME_LIMIT = 300.0
 """Planning time that a run may take [s]; the paper's limit is the number of samples."""
 
+WARM_UP = 0.01
+"""Planning time of a run before the measured ones, so that none of them waits for the compiler [s]."""
+
 Watch: TypeAlias = Callable[[int, str], AbstractContextManager[Callable[[int, float], None] | None]]
 """Makes the progress report of one run from its number of samples at most and its name."""
 
@@ -113,6 +116,8 @@ def run_demo(output: Path, seed: int | None, watch: Watch) -> Iterator[DemoRun]:
     Yields:
         Each run when it is done and written.
     """
+    for scene, planner in PAPER:
+        plan(load_scenario(scenario_path(scene)), planner, seed, WARM_UP)
     runs = []
     for scene, planner in PAPER:
         path = scenario_path(scene)
