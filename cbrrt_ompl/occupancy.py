@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cbrrt_ompl.errors import MapError, Problem
 from cbrrt_ompl.obstacles import MAX_COORDINATE, Bounds, Box, Obstacle, OrientedBox, Polygon
+from cbrrt_ompl.plain_yaml import Remark
 
 UNKNOWN, FREE, OCCUPIED = -1, 0, 100
 """What a cell may be, in the numbers of ROS."""
@@ -63,18 +64,18 @@ def cells_from(
     values = np.asarray(grid)
     check_thresholds(occupied_thresh, free_thresh)
     if values.ndim != 2 or values.size == 0:
-        raise MapError(Problem("grid", f"shape {values.shape}", "cells in rows and columns"))
+        raise MapError(Problem("grid", Remark(f"the shape {values.shape}"), "cells in rows and columns"))
     check_cell_count(values.shape, "grid")
     if values.dtype == bool:
         return np.where(values, OCCUPIED, FREE).astype(np.int8)
     if values.dtype.kind not in "iuf":
-        raise MapError(Problem("grid", f"values of type {values.dtype}", "truth values or numbers"))
+        raise MapError(Problem("grid", Remark(f"values of type {values.dtype}"), "truth values or numbers"))
     is_whole = values.dtype.kind in "iu"
     low, high = (float(f(values)) for f in (np.nanmin, np.nanmax)) if not np.isnan(values).all() else (0.0, 0.0)
     if is_whole and not (-1 <= low and high <= 100):
-        raise MapError(Problem("grid", f"values from {low:g} to {high:g}", "whole numbers from -1 to 100"))
+        raise MapError(Problem("grid", Remark(f"values from {low:g} to {high:g}"), "whole numbers from -1 to 100"))
     if not is_whole and not (0.0 <= low and high <= 1.0):
-        raise MapError(Problem("grid", f"values from {low:g} to {high:g}", "likelihoods from 0 to 1, or NaN"))
+        raise MapError(Problem("grid", Remark(f"values from {low:g} to {high:g}"), "likelihoods from 0 to 1, or NaN"))
     scale = 100.0 if is_whole and high > 1 else 1.0
     cells = np.full(values.shape, UNKNOWN, dtype=np.int8)
     cells[values > scale * occupied_thresh] = OCCUPIED
@@ -97,7 +98,9 @@ def blocked_cells(cells: NDArray[np.int8], unknown: str) -> NDArray[np.bool_]:
     blocked = cells != FREE if unknown == "occupied" else cells == OCCUPIED
     if blocked.all():
         hint = " (unknown cells count as occupied)" if (cells == UNKNOWN).any() else ""
-        raise MapError(Problem("cells", f"{cells.shape[1]} x {cells.shape[0]} blocked cells", f"a free cell{hint}"))
+        raise MapError(
+            Problem("cells", Remark(f"{cells.shape[1]} x {cells.shape[0]} blocked ones"), f"a free one{hint}")
+        )
     return blocked
 
 
@@ -182,7 +185,7 @@ def check_frame(shape: tuple[int, ...], resolution: float, origin: Sequence[floa
     if len(values) != 3 or not all(_is_number(value) for value in values):
         problems.append(Problem("origin", origin, "three finite numbers [x, y, yaw] [m, m, rad]"))
     if not problems and np.abs(grid_corners(shape, resolution, values)).max() > MAX_COORDINATE:
-        found = f"{shape[1]} x {shape[0]} cells of {resolution:g} m at {values[:2]}"
+        found = Remark(f"{shape[1]} x {shape[0]} cells of {resolution:g} m at {values[:2]}")
         problems.append(Problem("resolution", found, f"a map within {MAX_COORDINATE:g} m of zero"))
     if problems:
         raise MapError(problems)
@@ -206,7 +209,7 @@ def check_cell_count(shape: tuple[int, ...], field: str) -> None:
         MapError: if it has more than ``MAX_CELLS`` cells.
     """
     if shape[0] * shape[1] > MAX_CELLS:
-        raise MapError(Problem(field, f"{shape[1]} x {shape[0]} cells", f"at most {MAX_CELLS} cells"))
+        raise MapError(Problem(field, Remark(f"{shape[1]} x {shape[0]} cells"), f"at most {MAX_CELLS} cells"))
 
 
 def _is_number(value: Any) -> bool:

@@ -13,7 +13,7 @@ from hypothesis.extra.numpy import array_shapes, arrays
 from numpy.typing import ArrayLike, NDArray
 
 from cbrrt_ompl.errors import MapError, WorldError
-from cbrrt_ompl.obstacles import OrientedBox, Polygon
+from cbrrt_ompl.obstacles import Obstacle, OrientedBox, Polygon
 from cbrrt_ompl.occupancy import covering_rectangles, grid_bounds, grid_obstacles
 from cbrrt_ompl.robot import Footprint
 from cbrrt_ompl.world import Bounds, Box, Disc, World
@@ -148,8 +148,8 @@ def test_thresholds_part_likelihoods() -> None:
         (np.full((2, 2), 1.5), "likelihoods from 0 to 1"),
         (np.full((2, 2), math.inf), "likelihoods from 0 to 1"),
         (np.array([["a", "b"]]), "truth values or numbers"),
-        (np.ones((2, 2), dtype=bool), "a free cell"),
-        (np.full((2, 2), math.nan), r"a free cell \(unknown cells count as occupied\)"),
+        (np.ones((2, 2), dtype=bool), "a free one"),
+        (np.full((2, 2), math.nan), r"a free one \(unknown cells count as occupied\)"),
         (np.broadcast_to(np.zeros(1), (20_000, 20_000)), "at most 100000000 cells"),
     ],
 )
@@ -253,7 +253,7 @@ def test_a_hundred_thousand_obstacles_are_built_and_asked_quickly() -> None:
     """The broad phase once split tall boxes by height, where all are alike: a query took a millisecond."""
     rng = np.random.default_rng(0)
     places = rng.uniform(0.0, 100.0, (100_000, 2)).tolist()
-    obstacles = [Box((x, y), (x + 0.05, y + 0.05)) for x, y in places[:90_000]]
+    obstacles: list[Obstacle] = [Box((x, y), (x + 0.05, y + 0.05)) for x, y in places[:90_000]]
     obstacles += [Disc((x, y), 0.03) for x, y in places[90_000:]]
     started = time.process_time()
     checker = World(Bounds((-1.0, -1.0), (101.0, 101.0)), obstacles).checker(Footprint.disc(0.1))
