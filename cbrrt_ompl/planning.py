@@ -11,7 +11,6 @@ from functools import cached_property
 import numpy as np
 
 from cbrrt_ompl.clearance_map import clearance_map_for
-from cbrrt_ompl.compiled.growth import SAMPLES
 from cbrrt_ompl.compiled.search import Search
 from cbrrt_ompl.errors import Problem, SettingsError, UnknownPlannerError
 from cbrrt_ompl.extension import check_step, law_of, pack_model
@@ -144,7 +143,7 @@ def _plan_compiled(scenario: Scenario, planner: str, seed: int | None, watch: _W
         status=SOLVED if search.has_reached_goal else watch.ended_by,
         trajectory=search.trajectory() if search.has_reached_goal else None,
         nodes=search.nodes,
-        samples=int(search.counters[SAMPLES]),
+        samples=search.samples,
         planning_time=planning_time,
         make_tree=search.tree,
     )

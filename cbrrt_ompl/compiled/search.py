@@ -97,12 +97,12 @@ class Search:
         """
         portion = 64
         while not self.has_reached_goal and self.counters[SAMPLES] < max_samples:
-            if should_stop(int(self.counters[SAMPLES])):
+            if should_stop(self.samples):
                 return
-            before, began = int(self.counters[SAMPLES]), time.perf_counter()
+            before, began = self.samples, time.perf_counter()
             self._grow(min(max_samples, before + portion), began + 2.0 * PAUSE)
             elapsed = max(time.perf_counter() - began, 1e-6)
-            done = int(self.counters[SAMPLES]) - before
+            done = self.samples - before
             portion = int(min(max(16, done * PAUSE / elapsed), 4 * portion))
 
     def _grow(self, last_sample: int, deadline: float) -> None:
@@ -131,7 +131,7 @@ class Search:
                 self._question,
             )
             if status == WANT_ANSWER:
-                now_at = int(self.counters[SAMPLES])
+                now_at = self.samples
                 answered = m.answer(answered if now_at == asked_at else 0, *self._question.tolist())
                 asked_at = now_at
                 if time.perf_counter() > deadline and not answered:
@@ -174,6 +174,11 @@ class Search:
     def nodes(self) -> int:
         """Nodes of the tree."""
         return int(self.counters[NODES])
+
+    @property
+    def samples(self) -> int:
+        """Samples drawn so far."""
+        return int(self.counters[SAMPLES])
 
     def edges(self) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
         """States (n, 5), parents (n,), controls (n, 3) and steps (n,) of all nodes."""

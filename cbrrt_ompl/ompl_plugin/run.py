@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
-from cbrrt_ompl.clearance_map import clearance_map_for
+from cbrrt_ompl.clearance_map import ClearanceMap, clearance_map_for
 from cbrrt_ompl.ompl_plugin.binding import ob, ou
 from cbrrt_ompl.ompl_plugin.results import trajectory_from_path, tree_from_planner
-from cbrrt_ompl.ompl_plugin.setup import make_equipped_setup
+from cbrrt_ompl.ompl_plugin.setup import Equipment, make_equipped_setup
 from cbrrt_ompl.scenario import Scenario
 from cbrrt_ompl.trajectory import Trajectory
 from cbrrt_ompl.tree import Tree
@@ -37,6 +37,8 @@ def run(
     seed: int | None,
     on_start: Callable[[], None],
     should_stop: Callable[[int], bool],
+    clearance_map: ClearanceMap | None = None,
+    on_equipped: Callable[[Equipment], None] = lambda _: None,
 ) -> Found:
     """Set a planner up and let it solve the scenario.
 
@@ -46,13 +48,16 @@ def run(
         seed: 0 or more, or None for a fresh one.
         on_start: called when the search begins.
         should_stop: called once a round of the planner's main loop, with the rounds so far.
+        clearance_map: of the scenario's world and footprint; None takes the one that goes with the world.
+        on_equipped: takes what the planner was given.
     """
     with quiet_ompl():
         if seed is not None:
             # OMPL complains about a second seed in a process; yet all that is random below is allocated from here on
             ou.RNG.setSeed(seed + 1)
-        clearance_map = clearance_map_for(scenario.world, scenario.robot.footprint)
+        clearance_map = clearance_map or clearance_map_for(scenario.world, scenario.robot.footprint)
         setup, equipment = make_equipped_setup(scenario, planner, clearance_map)
+        on_equipped(equipment)
         setup.setup()
         rounds = _Rounds(scenario.planning.max_samples, should_stop)
         condition = ob.PlannerTerminationCondition(ob.PlannerTerminationConditionFn(rounds))

@@ -34,6 +34,7 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
     Attributes:
         samples: calls so far.
         refused: calls refused by line 5 of Algorithm II.
+        children: nodes made so far.
     """
 
     def __init__(self, si: Any, space: Any, model: NDArray[np.float64], clearance_map: ClearanceMap) -> None:
@@ -57,7 +58,7 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         self._first_child: dict[bytes, int] = {}
         self._following = np.empty(64, dtype=np.int32)
         self._commands = np.empty((64, 2))
-        self._children = 0
+        self.children = 0
 
     def sampleTo(self, control: Any, *states: Any) -> int:  # noqa: N802  # OMPL's name
         """Extend ``states[-2]`` towards ``states[-1]``; OMPL may pass the node's control before them."""
@@ -109,14 +110,14 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
 
     def _remember(self, node: bytes, v: float, omega: float) -> None:
         """Note the command of a new child, for line 5 of Algorithm II."""
-        child = self._children
+        child = self.children
         if child == len(self._following):
             self._following = np.concatenate([self._following, np.empty_like(self._following)])
             self._commands = np.concatenate([self._commands, np.empty_like(self._commands)])
         self._following[child] = self._first_child.get(node, -1)
         self._commands[child] = v, omega
         self._first_child[node] = child
-        self._children = child + 1
+        self.children = child + 1
 
 
 class KanayamaDirectedControlSampler(ExtensionSampler):
