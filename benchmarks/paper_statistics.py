@@ -47,7 +47,10 @@ def main() -> None:
     parser.add_argument("--suffix", default="", help="planner variant, such as -compiled")
     parser.add_argument("--failing-runs", type=int, default=20, help="runs where every run draws all samples")
     arguments = parser.parse_args()
-    print("scene             planner           solved  nodes: quartiles     prototype         p     samples  duration  verified")
+    print(
+        "scene             planner           solved  nodes: quartiles     prototype         p     samples"
+        "  duration  verified"
+    )
     for (scene, planner), (cuts, share, duration) in PROTOTYPE.items():
         scenario = load_scenario(SCENARIOS / f"{scene}.yaml")
         runs = arguments.runs if cuts else arguments.failing_runs

@@ -1,9 +1,9 @@
 """FCL's answers, certified and stored: a quadtree that decides states in compiled code.
 
-The distance of a point from the nearest solid is 1-Lipschitz. If FCL says that the centre q of a cell has clearance c,
-then every position p with \\|p - q\\| < c - r is free for a footprint inside a disc of radius r, and every p with
-\\|p - q\\| < r' - c is in collision for a footprint that holds a disc of radius r' (c is negative below a surface). What
-neither certificate decides is asked: FCL answers with the real footprint, and the cell is split where the question was.
+The distance of a point from the nearest solid is 1-Lipschitz. If FCL says that a point q has clearance c,
+then every position p nearer to q than c - r is free for a footprint inside a disc of radius r, and every p nearer than
+r' - c is in collision for a footprint that holds a disc of radius r' (c is negative below a surface). What neither
+certificate decides is asked: FCL answers with the real footprint, and the cell is split where the question was.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ UNDECIDED = 0.0
 CERTIFICATE_MARGIN = 1e-6
 """What a certificate must hold by [m]: well above the rounding of FCL's closed-form distances and of its GJK."""
 
-SMALLEST_CELL = 0.02
-"""Cells are split down to about this size [m], or to 2^-16 of the world's where that is larger."""
+SMALLEST_CELL = 0.002
+"""Cells are split down to no less than this size [m]."""
 
 MAX_CELLS = 2_000_000
-"""Cells that a map holds at most: 24 MB."""
+"""Cells that a map holds at most: 56 MB."""
 
 
 class MapView(NamedTuple):
@@ -41,7 +41,7 @@ class MapView(NamedTuple):
     children: NDArray[np.int32]
     """Index of the first of a cell's four children, 0 at a leaf; empty where there is no map, shape (n,)."""
     clearances: NDArray[np.float64]
-    """Signed clearance of each cell's centre, shape (n,) [m]."""
+    """Where FCL was asked in each cell, and the signed clearance there: rows of (x, y, clearance), shape (n, 3) [m]."""
     x_min: float
     """Bounds of the world [m]."""
     y_min: float
@@ -109,9 +109,9 @@ def certify(view: MapView, x: float, y: float) -> float:
         return COLLISION
     if len(view.children) == 0:
         return UNDECIDED
-    cell, x_centre, y_centre, _ = find_leaf(view, x, y)
-    clearance = view.clearances[cell]
-    distance = math.sqrt((x - x_centre) * (x - x_centre) + (y - y_centre) * (y - y_centre)) + CERTIFICATE_MARGIN
+    cell, _, _, _ = find_leaf(view, x, y)
+    dx, dy, clearance = x - view.clearances[cell, 0], y - view.clearances[cell, 1], view.clearances[cell, 2]
+    distance = math.sqrt(dx * dx + dy * dy) + CERTIFICATE_MARGIN
     if clearance - view.outer - distance > 0.0:
         return clearance - view.outer - distance
     if view.inner - clearance - distance > 0.0:
@@ -143,28 +143,29 @@ class ClearanceMap:
         """
         self.checker = world.checker(footprint)
         self.enabled = enabled
+        self._is_round = footprint.is_round
         self.exact_queries = 0
         self._signed_clearance = world.checker(Footprint.point()).signed_clearance
         bounds = world.bounds
         size = max(bounds.size)
-        self._smallest = max(SMALLEST_CELL, size / 2**16)
+        self._smallest = 2.0 * SMALLEST_CELL
         inner = footprint.inscribed_radius + (CONTACT_TOLERANCE if footprint.is_round else 0.0)
+        if footprint.inscribed_radius == 0.0 and not footprint.is_round:
+            inner = -math.inf  # the origin is beside the footprint, and may well be inside an obstacle
         outer = footprint.circumscribed_radius + MITRE_LIMIT * CONTACT_TOLERANCE
         self.frame = np.array([*bounds.min, *bounds.max, size, inner, outer, footprint.is_round], dtype=float)
         self.answers = np.empty((64, 4))
         self._cells = 1 if enabled else 0
         self.children = np.zeros(self._cells, dtype=np.int32)
-        self.clearances = np.zeros(self._cells)
+        self.clearances = np.zeros((self._cells, 3))
         if enabled:
-            x, y = bounds.min[0] + 0.5 * size, bounds.min[1] + 0.5 * size
-            self.clearances[0] = self._signed_clearance(x, y)
+            self._ask_clearance(0, bounds.min[0] + 0.5 * size, bounds.min[1] + 0.5 * size)
 
     @property
     def view(self) -> MapView:
         """The map for a kernel, as it is now."""
-        f = self.frame
-        numbers = (float(value) for value in f[:7])
-        return MapView(self.children, self.clearances, *numbers, is_round=bool(f[7]))
+        x_min, y_min, x_max, y_max, size, inner, outer, is_round = self.frame.tolist()
+        return MapView(self.children, self.clearances, x_min, y_min, x_max, y_max, size, inner, outer, is_round != 0.0)
 
     @property
     def cells(self) -> int:
@@ -201,8 +202,22 @@ class ClearanceMap:
         if answered == len(self.answers):
             self.answers = np.concatenate([self.answers, np.empty_like(self.answers)])
         self.exact_queries += 1
-        self.answers[answered] = x, y, theta, self.checker.margin(x, y, theta)
+        self.answers[answered] = x, y, theta, self._margin(x, y, theta)
         return answered + 1
+
+    def _margin(self, x: float, y: float, theta: float) -> float:
+        """FCL's margin at a pose, 0 in collision; for a round footprint the map keeps it, in place of an older one."""
+        if self._is_round and self.enabled:
+            cell, _, _, _ = find_leaf(self.view, x, y)
+            self._ask_clearance(cell, x, y)
+            certificate = certify_packed(self.children, self.clearances, self.frame, x, y)
+            if certificate != UNDECIDED:
+                return max(certificate, 0.0)
+        return self.checker.margin(x, y, theta)
+
+    def _ask_clearance(self, cell: int, x: float, y: float) -> None:
+        """Let FCL measure the clearance of a point in a cell, and keep it."""
+        self.clearances[cell] = x, y, self._signed_clearance(x, y)
 
     def _refine(self, x: float, y: float) -> bool:
         """Split the cells at an undecided position until it is decided; False where nothing could be split."""
@@ -210,7 +225,7 @@ class ClearanceMap:
         while self._cells + 4 <= MAX_CELLS and self.enabled:
             view = self.view
             cell, x_centre, y_centre, size = find_leaf(view, x, y)
-            if size <= self._smallest:
+            if size < self._smallest:
                 break
             self._split(cell, x_centre, y_centre, 0.25 * size)
             has_grown = True
@@ -224,9 +239,9 @@ class ClearanceMap:
         if first + 4 > len(self.children):
             capacity = min(2 * len(self.children) + 64, MAX_CELLS + 4)
             self.children = np.concatenate([self.children, np.zeros(capacity - first, dtype=np.int32)])
-            self.clearances = np.concatenate([self.clearances, np.zeros(capacity - first)])
+            self.clearances = np.concatenate([self.clearances, np.zeros((capacity - first, 3))])
         for i, (dx, dy) in enumerate(((-1, -1), (1, -1), (-1, 1), (1, 1))):
-            self.clearances[first + i] = self._signed_clearance(x + dx * offset, y + dy * offset)
+            self._ask_clearance(first + i, x + dx * offset, y + dy * offset)
         self._cells += 4
         self.children[cell] = first  # last, so that no reader ever meets a child without its clearance
 

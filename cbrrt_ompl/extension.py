@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from cbrrt_ompl.clearance_map import COLLISION, UNDECIDED, MapView, certify
 from cbrrt_ompl.control_laws import reference_pose, steering_rate, tracking_command
 from cbrrt_ompl.errors import Problem, SettingsError
-from cbrrt_ompl.kinematics import dynamic_step, kinematic_step, unicycle_step
+from cbrrt_ompl.kinematics import arc_length, dynamic_step, kinematic_step, unicycle_step, wrap_angle
 from cbrrt_ompl.robot import Gains, Limits, Robot
 from cbrrt_ompl.settings import Goal, PlanningSettings
 
@@ -26,7 +26,7 @@ OPEN_LOOP, CLOSED_LOOP, STEERING = 0, 1, 2
 EXTENDED, REFUSED, BLOCKED, ASK = 0, 1, 2, 3
 """What came of an extension: a new node, line 5 of Algorithm II, an obstacle, or a question to FCL."""
 
-MOTION_RESOLUTION = 1e-4
+MOTION_RESOLUTION = 1e-3
 """Largest distance between two checked points of a motion [m]: nothing thicker than this is passed through."""
 
 CANDIDATES = 3
@@ -135,7 +135,7 @@ def in_goal(goal: GoalRegion, x: float, y: float, theta: float, v: float, omega:
     return abs(v) <= goal.speed_tolerance and abs(omega) <= goal.speed_tolerance
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")  # a call costs as much as the step itself
 def advance(
     x: float,
     y: float,
@@ -143,7 +143,9 @@ def advance(
     v: float,
     omega: float,
     control: tuple[float, float, float],
-    model: Model,
+    law: int,
+    limits: Limits,
+    gains: Gains,
     dt: float,
 ) -> tuple[float, float, float, float, float, float, float]:
     """One integration step under a control.
@@ -155,21 +157,23 @@ def advance(
         v: forward velocity [m/s].
         omega: turning rate [rad/s].
         control: command (v, omega, unused), or the reference pose (x_r, y_r, theta_r) where the law is `CLOSED_LOOP`.
-        model: how the robot moves.
+        law: `OPEN_LOOP`, `CLOSED_LOOP` or `STEERING`.
+        limits: limits of the robot.
+        gains: gains of the closed loop.
         dt: duration of the step [s].
 
     Returns:
         (x, y, theta, v, omega) one step later, and the command (v, omega) of the step.
     """
-    if model.law == STEERING:
+    if law == STEERING:
         command = (control[0], control[1])
         x, y, theta, v, omega = kinematic_step(x, y, theta, command, dt)
         return x, y, theta, v, omega, command[0], command[1]
-    if model.law == CLOSED_LOOP:
-        command = tracking_command(x, y, theta, control, model.limits, model.gains)
+    if law == CLOSED_LOOP:
+        command = tracking_command(x, y, theta, control, limits, gains)
     else:
         command = (control[0], control[1])
-    x, y, theta, v, omega = dynamic_step(x, y, theta, v, omega, command, model.limits, dt)
+    x, y, theta, v, omega = dynamic_step(x, y, theta, v, omega, command, limits, dt)
     return x, y, theta, v, omega, command[0], command[1]
 
 
@@ -192,12 +196,21 @@ def find_answer(answers: NDArray[np.float64], answered: int, x: float, y: float,
 
 @njit(cache=True)
 def is_doomed(
-    states: NDArray[np.float64], k: int, control: tuple[float, float, float], model: Model, view: MapView
+    x: float,
+    y: float,
+    theta: float,
+    v: float,
+    omega: float,
+    steps: int,
+    control: tuple[float, float, float],
+    model: Model,
+    view: MapView,
 ) -> bool:
-    """Whether the map alone shows that the way on from row k meets an obstacle: then FCL need not be asked."""
-    x, y, theta, v, omega = states[k, 0], states[k, 1], states[k, 2], states[k, 3], states[k, 4]
-    for _ in range(k, model.steps):
-        x, y, theta, v, omega, _, _ = advance(x, y, theta, v, omega, control, model, model.dt)
+    """Whether the map alone shows that the next steps meet an obstacle: then FCL need not be asked."""
+    for _ in range(steps):
+        x, y, theta, v, omega, _, _ = advance(
+            x, y, theta, v, omega, control, model.law, model.limits, model.gains, model.dt
+        )
         if certify(view, x, y) == COLLISION:
             return True
         if in_goal(model.goal, x, y, theta, v, omega):
@@ -205,24 +218,95 @@ def is_doomed(
     return False
 
 
+class Step(NamedTuple):
+    """One integration step, as the check between its ends sees it."""
+
+    x: float
+    """Position at the start [m]."""
+    y: float
+    theta: float
+    """Heading at the start [rad]."""
+    v: float
+    """Forward velocity at the start [m/s]."""
+    omega: float
+    """Turning rate at the start [rad/s]."""
+    x_end: float
+    """Position at the end [m]."""
+    y_end: float
+    theta_end: float
+    """Heading at the end [rad]."""
+    v_end: float
+    """Forward velocity at the end [m/s]."""
+    omega_end: float
+    """Turning rate at the end [rad/s]."""
+    travel: float
+    """Bound on the way of the robot's origin [m]."""
+    sweep: float
+    """Bound on the way of any point of the footprint [m]."""
+
+
+@njit(cache=True)
+def check_step_motion(
+    step: Step, margin: float, is_certified: bool, view: MapView, answers: NDArray[np.float64], answered: int, dt: float
+) -> tuple[int, float, bool, tuple[float, float, float]]:
+    """Check the points of one step, each no more than `MOTION_RESOLUTION` after the one before.
+
+    A point with margin m proves all points of the next m metres, so few of them are looked at. What is accepted depends
+    on the points alone, never on what the map holds.
+
+    Args:
+        step: the step.
+        margin: distance proven free at its start [m].
+        is_certified: whether the map says so, for every heading; else FCL did, for the heading there.
+        view: the clearance map.
+        answers: what FCL has said, see :func:`find_answer`.
+        answered: rows of ``answers`` in use.
+        dt: duration of the step [s].
+
+    Returns:
+        `EXTENDED` (free), `BLOCKED` or `ASK`; margin and ``is_certified`` at the end; and the pose looked at last.
+    """
+    points = int(step.sweep / MOTION_RESOLUTION) + 1
+    pose = (step.x_end, step.y_end, step.theta_end)
+    i = 0
+    while i < points:
+        spacing = (step.travel if is_certified else step.sweep) / points
+        proven = int(margin / spacing) if spacing > 1e-12 else points
+        if i + proven >= points:
+            return EXTENDED, margin - (points - i) * spacing, is_certified, pose
+        i += proven + 1
+        pose = (step.x_end, step.y_end, step.theta_end)
+        if i < points:
+            share = i / points
+            v = step.v + share * (step.v_end - step.v)
+            omega = step.omega + share * (step.omega_end - step.omega)
+            pose = unicycle_step(step.x, step.y, step.theta, step.v, step.omega, v, omega, share * dt)
+        margin, is_certified = certify(view, pose[0], pose[1]), True
+        if margin == UNDECIDED:
+            margin, is_certified = find_answer(answers, answered, pose[0], pose[1], pose[2]), False
+            if margin < 0.0:
+                return ASK, margin, is_certified, pose
+        if margin <= 0.0:
+            return BLOCKED, margin, is_certified, pose
+    return EXTENDED, margin, is_certified, pose
+
+
 @njit(cache=True)
 def roll_out(
-    states: NDArray[np.float64],
+    node: tuple[float, float, float, float, float],
     control: tuple[float, float, float],
     model: Model,
     view: MapView,
     answers: NDArray[np.float64],
     answered: int,
-) -> tuple[int, int, tuple[float, float, float]]:
+) -> tuple[int, int, tuple[float, float, float, float, float], tuple[float, float, float]]:
     """Drive from a valid state under one control until the horizon, the goal or an obstacle.
 
-    The way is checked between the steps too: each step has points no more than `MOTION_RESOLUTION` apart, and each of
-    them must be free. A point with margin m proves all points of the next m metres, so few of them are looked at. (With
-    a footprint that is not round, an answer of FCL's holds for the heading asked; then turning uses the margin up as
-    well, at the circumscribed radius.) What is accepted depends on these points alone, never on what the map holds.
+    The steps are those of :func:`advance`, bit for bit; once the velocities are constant, what is constant with them is
+    not computed again.
 
     Args:
-        states: row 0 holds the start; the others are filled, shape (steps + 1, 5).
+        node: (x, y, theta, v, omega) at the start.
         control: see :func:`advance`.
         model: how the robot moves.
         view: the clearance map.
@@ -230,53 +314,56 @@ def roll_out(
         answered: rows of ``answers`` in use.
 
     Returns:
-        The last step known to be free; `EXTENDED`, `BLOCKED` or `ASK`; and the pose that FCL must decide.
+        The number of steps known to be free; `EXTENDED`, `BLOCKED` or `ASK`; the state after these steps; and the pose
+        that FCL must decide.
     """
-    x, y, theta, v, omega = states[0, 0], states[0, 1], states[0, 2], states[0, 3], states[0, 4]
-    margin = max(certify(view, x, y), 0.0)
-    is_certified = margin > 0.0  # certificates hold for all headings, answers of FCL's for one
+    x, y, theta, v, omega = node
+    dt = model.dt
+    goal = model.goal
+    near_goal = goal.tolerance * goal.tolerance * (1.0 + 1e-9)
     reach = 0.0 if view.is_round else view.outer
+    margin = max(certify(view, x, y), 0.0)
+    is_certified = margin > 0.0
+    is_steady = False
+    along = turn = half_turn = travel = sweep = 0.0
     for k in range(1, model.steps + 1):
         x0, y0, theta0, v0, omega0 = x, y, theta, v, omega
-        x, y, theta, v, omega, _, _ = advance(x, y, theta, v, omega, control, model, model.dt)
-        if model.law == STEERING:
-            v0, omega0 = v, omega
-        travel = max(abs(v0), abs(v)) * model.dt
-        sweep = travel + reach * max(abs(omega0), abs(omega)) * model.dt
+        if is_steady:
+            middle = theta + half_turn
+            if along != 0.0:
+                x, y = x + along * math.cos(middle), y + along * math.sin(middle)
+            theta = wrap_angle(theta + turn)
+        else:
+            x, y, theta, v, omega, v_command, omega_command = advance(
+                x, y, theta, v, omega, control, model.law, model.limits, model.gains, dt
+            )
+            if model.law == STEERING:
+                v0, omega0 = v, omega
+            travel = max(abs(v0), abs(v)) * dt
+            sweep = travel + reach * max(abs(omega0), abs(omega)) * dt
+            if model.law != CLOSED_LOOP and v0 == v == v_command and omega0 == omega == omega_command:
+                is_steady = True
+                turn = 0.5 * (omega + omega) * dt
+                half_turn = 0.125 * dt * (3.0 * omega + omega)
+                along = arc_length(0.5 * (v + v), turn, dt)
         if margin >= (travel if is_certified else sweep):
             margin -= travel if is_certified else sweep
         else:
-            points = int(sweep / MOTION_RESOLUTION) + 1
-            i = 0
-            while True:
-                spacing = (travel if is_certified else sweep) / points
-                i += 1 + (int(margin / spacing) if spacing > 1e-12 else points)
-                if i > points:
-                    margin -= (points + 1 - i + int(margin / spacing)) * spacing if spacing > 1e-12 else 0.0
-                    break
-                if i == points:
-                    xs, ys, thetas = x, y, theta
-                else:
-                    share = i / points
-                    vs, omegas = v0 + share * (v - v0), omega0 + share * (omega - omega0)
-                    xs, ys, thetas = unicycle_step(x0, y0, theta0, v0, omega0, vs, omegas, share * model.dt)
-                margin = certify(view, xs, ys)
-                is_certified = True
-                if margin == UNDECIDED:
-                    is_certified = False
-                    margin = find_answer(answers, answered, xs, ys, thetas)
-                    if margin < 0.0:
-                        if not model.keep_cut and is_doomed(states, k - 1, control, model, view):
-                            return k - 1, BLOCKED, (xs, ys, thetas)
-                        return k - 1, ASK, (xs, ys, thetas)
-                if margin <= 0.0:
-                    return k - 1, BLOCKED, (xs, ys, thetas)
-                if i == points:
-                    break
-        states[k, 0], states[k, 1], states[k, 2], states[k, 3], states[k, 4] = x, y, theta, v, omega
-        if in_goal(model.goal, x, y, theta, v, omega):
-            return k, EXTENDED, (x, y, theta)
-    return model.steps, EXTENDED, (x, y, theta)
+            step = Step(x0, y0, theta0, v0, omega0, x, y, theta, v, omega, travel, sweep)
+            outcome, margin, is_certified, pose = check_step_motion(
+                step, margin, is_certified, view, answers, answered, dt
+            )
+            if outcome != EXTENDED:
+                before = (x0, y0, theta0, node[3] if k == 1 else v0, node[4] if k == 1 else omega0)
+                if outcome == ASK and not model.keep_cut:
+                    rest = model.steps + 1 - k
+                    if is_doomed(x0, y0, theta0, before[3], before[4], rest, control, model, view):
+                        outcome = BLOCKED
+                return k - 1, outcome, before, pose
+        dx, dy = x - goal.x, y - goal.y
+        if dx * dx + dy * dy < near_goal and in_goal(goal, x, y, theta, v, omega):
+            return k, EXTENDED, (x, y, theta, v, omega), (x, y, theta)
+    return model.steps, EXTENDED, (x, y, theta, v, omega), (x, y, theta)
 
 
 @njit(cache=True)
@@ -308,13 +395,16 @@ def is_refused(
 
 @njit(cache=True)
 def candidate(
-    index: int, node: NDArray[np.float64], reference: tuple[float, float, float], model: Model
+    index: int,
+    node: tuple[float, float, float, float, float],
+    reference: tuple[float, float, float],
+    model: Model,
 ) -> tuple[float, float, tuple[float, float, float]]:
     """A command worth trying from a node, and the control that carries it out.
 
     Args:
         index: 0 for CB-RRT; 0, 1, 2 for the steering rates of S-RRT.
-        node: state of the node, shape (5,).
+        node: (x, y, theta, v, omega) of the node.
         reference: pose to drive to, [m, m, rad].
         model: how the robot moves.
 
@@ -330,9 +420,24 @@ def candidate(
     return v, omega, (v, omega, 0.0)
 
 
+class Extension(NamedTuple):
+    """What came of an extension."""
+
+    outcome: int
+    """`EXTENDED`, `REFUSED`, `BLOCKED` or `ASK`."""
+    steps: int
+    """Integration steps."""
+    state: tuple[float, float, float, float, float]
+    """(x, y, theta, v, omega) at the end."""
+    command: tuple[float, float]
+    """Command (v, omega) that line 5 compares."""
+    control: tuple[float, float, float]
+    """Control for :func:`advance`; for `ASK` the pose in question instead."""
+
+
 @njit(cache=True)
 def extend(
-    states: NDArray[np.float64],
+    node: tuple[float, float, float, float, float],
     x_sample: float,
     y_sample: float,
     first: int,
@@ -342,14 +447,14 @@ def extend(
     view: MapView,
     answers: NDArray[np.float64],
     answered: int,
-) -> tuple[int, int, int, float, float, tuple[float, float, float]]:
+) -> Extension:
     """EXTEND_TRAJECTORY of the paper: from a node towards a sample.
 
     CB-RRT has one candidate. S-RRT tries its three steering rates, leaves out those that the node has used or that
     collide, and takes the one that ends nearest to the reference.
 
     Args:
-        states: the first row holds the node; a block a candidate is filled, shape (CANDIDATES, steps + 1, 5).
+        node: (x, y, theta, v, omega) of the node.
         x_sample: the sample [m].
         y_sample: the sample [m].
         first: latest child of the node, see :func:`is_refused`.
@@ -359,36 +464,27 @@ def extend(
         view: the clearance map.
         answers: what FCL has said in this extension, see :func:`find_answer`.
         answered: rows of ``answers`` in use.
-
-    Returns:
-        What came of it (`EXTENDED`, `REFUSED`, `BLOCKED` or `ASK`), the candidate chosen, its number of steps, its
-        command (v, omega) and its control; for `ASK`, the pose in question in place of the control.
     """
-    node = states[0, 0]
     reference = reference_pose(node[0], node[1], node[2], x_sample, y_sample, model.look_ahead)
-    result, chosen, count = REFUSED, 0, 0
-    v_chosen, omega_chosen, control_chosen = 0.0, 0.0, (0.0, 0.0, 0.0)
+    best = Extension(REFUSED, 0, node, (0.0, 0.0), (0.0, 0.0, 0.0))
     nearest = math.inf
     for c in range(CANDIDATES if model.law == STEERING else 1):
         v, omega, control = candidate(c, node, reference, model)
         if is_refused(first, following, commands, v, omega, model.equal_control_tolerance):
             continue
-        for i in range(5):
-            states[c, 0, i] = node[i]
-        last, outcome, pose = roll_out(states[c], control, model, view, answers, answered)
+        steps, outcome, state, pose = roll_out(node, control, model, view, answers, answered)
         if outcome == ASK:
-            return ASK, c, 0, v, omega, pose
-        if last == 0 or (outcome == BLOCKED and not model.keep_cut):
-            if result == REFUSED:
-                result = BLOCKED
+            return Extension(ASK, 0, node, (v, omega), pose)
+        if steps == 0 or (outcome == BLOCKED and not model.keep_cut):
+            if best.outcome == REFUSED:
+                best = Extension(BLOCKED, 0, node, (v, omega), control)
             continue
-        dx, dy = states[c, last, 0] - reference[0], states[c, last, 1] - reference[1]
+        dx, dy = state[0] - reference[0], state[1] - reference[1]
         distance = dx * dx + dy * dy
         if distance < nearest:
             nearest = distance
-            result, chosen, count = EXTENDED, c, last
-            v_chosen, omega_chosen, control_chosen = v, omega, control
-    return result, chosen, count, v_chosen, omega_chosen, control_chosen
+            best = Extension(EXTENDED, steps, state, (v, omega), control)
+    return best
 
 
 def check_step(robot: Robot, planning: PlanningSettings) -> None:

@@ -36,7 +36,7 @@ class Goal:
     """The goal region: a disc in (x, y), with the heading and the speed restricted on request.
 
     A state is in it where its distance to (x, y) is below ``tolerance`` (as in OMPL, strictly), the heading is at
-    most ``heading_tolerance`` away from ``theta``, and neither \\|v\\| [m/s] nor \\|omega\\| [rad/s] is above
+    most ``heading_tolerance`` away from ``theta``, and neither speed, of v [m/s] or omega [rad/s], is above
     ``speed_tolerance``.
 
     Raises:
@@ -54,7 +54,7 @@ class Goal:
     heading_tolerance: float = math.radians(10.0)
     """Largest deviation from ``theta`` [rad]; without meaning where ``theta`` is None."""
     speed_tolerance: float | None = None
-    """Largest \\|v\\| [m/s] and \\|omega\\| [rad/s] to arrive with; None leaves them free."""
+    """Largest speed to arrive with, of v [m/s] and of omega [rad/s]; None leaves them free."""
 
     def __post_init__(self) -> None:
         """Check all values together."""

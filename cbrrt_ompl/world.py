@@ -253,13 +253,13 @@ class CollisionChecker:
         """How far the footprint may move from this pose [m, m, rad] before it touches anything.
 
         Returns:
-            Its clearance less the contact tolerance [m]; 0 exactly where :meth:`collides` is true.
+            Its clearance less what the footprint was grown by [m]; 0 exactly where :meth:`collides` is true.
         """
         if not self._is_pose(x, y, theta):
             return 0.0
         self.queries += 1
         self._move(self._exact, x, y, theta)
-        margin = self._distance() - CONTACT_TOLERANCE
+        margin = self._distance() - MITRE_LIMIT * CONTACT_TOLERANCE
         if margin > CONTACT_TOLERANCE:  # else within the rounding of two different queries
             return margin
         return 0.0 if self.collides(x, y, theta) else _ZERO_DISTANCE

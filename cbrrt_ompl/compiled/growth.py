@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cbrrt_ompl.clearance_map import unpack_view
 from cbrrt_ompl.compiled.nearest import KD_TREE, Index, insert, nearest
-from cbrrt_ompl.extension import ASK, BLOCKED, CLOSED_LOOP, EXTENDED, REFUSED, extend, in_goal, unpack_model
+from cbrrt_ompl.extension import ASK, BLOCKED, CLOSED_LOOP, REFUSED, extend, in_goal, unpack_model
 
 REACHED, WANT_ANSWER, WANT_ROOM, WANT_DRAWS, PAUSED = 0, 1, 2, 3, 4
 """Why the loop returns: a node in the goal, a question to FCL, full arrays, no random numbers left, enough for now."""
@@ -125,7 +125,6 @@ def grow(
     clearances: NDArray[np.float64],
     frame: NDArray[np.float64],
     draws: NDArray[np.float64],
-    buffer: NDArray[np.float64],
     answers: NDArray[np.float64],
     answered: int,
     counters: NDArray[np.int64],
@@ -156,7 +155,6 @@ def grow(
         clearances: see above.
         frame: see above.
         draws: random numbers in [0, 1), a sample a row, shape (m, DRAWS).
-        buffer: room for an extension, shape (CANDIDATES, steps + 1, 5).
         answers: what FCL has said about the present extension.
         answered: rows of ``answers`` in use.
         counters: see `NODES`; carried from call to call, shape (COUNTERS,).
@@ -182,31 +180,34 @@ def grow(
         if draw[0] < goal_bias:
             x, y = model.goal.x, model.goal.y
         parent = one_of_twins(tree, nearest(index, x, y, counters[NODES], stack), draw[3])
-        for i in range(5):
-            buffer[0, 0, i] = states[parent, i]
-        status, chosen, count, v, omega, control = extend(
-            buffer, x, y, first_child[parent], siblings, commands, model, view, answers, answered
+        origin = (
+            states[parent, 0],
+            states[parent, 1],
+            states[parent, 2],
+            states[parent, 3],
+            states[parent, 4],
         )
-        if status == ASK:
-            question[0], question[1], question[2] = control
+        extension = extend(origin, x, y, first_child[parent], siblings, commands, model, view, answers, answered)
+        if extension.outcome == ASK:
+            question[0], question[1], question[2] = extension.control
             return WANT_ANSWER
         answered = 0
         counters[DRAWN] += 1
         counters[SAMPLES] += 1
-        if status == REFUSED:
+        if extension.outcome == REFUSED:
             counters[REFUSALS] += 1
-        elif status == BLOCKED:
+        elif extension.outcome == BLOCKED:
             counters[COLLISIONS] += 1
-        elif status == EXTENDED:
+        else:
             node = counters[NODES]
-            for i in range(5):
-                states[node, i] = buffer[chosen, count, i]
-            commands[node, 0], commands[node, 1] = v, omega
+            x, y, theta, v, omega = extension.state
+            states[node, 0], states[node, 1], states[node, 2], states[node, 3], states[node, 4] = x, y, theta, v, omega
+            commands[node, 0], commands[node, 1] = extension.command
             if model.law == CLOSED_LOOP:
-                references[node, 0], references[node, 1], references[node, 2] = control
-            steps[node] = count
+                references[node, 0], references[node, 1], references[node, 2] = extension.control
+            steps[node] = extension.steps
             add_node(tree, index, node, parent)
             counters[NODES] += 1
-            if in_goal(model.goal, states[node, 0], states[node, 1], states[node, 2], states[node, 3], states[node, 4]):
+            if in_goal(model.goal, x, y, theta, v, omega):
                 return REACHED
     return PAUSED

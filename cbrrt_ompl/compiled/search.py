@@ -26,14 +26,14 @@ from cbrrt_ompl.compiled.growth import (
     rebuild_index,
 )
 from cbrrt_ompl.compiled.nearest import GRID, KD_TREE, KINDS, Index
-from cbrrt_ompl.extension import CANDIDATES, CLOSED_LOOP
+from cbrrt_ompl.extension import CLOSED_LOOP
 from cbrrt_ompl.replay import trajectory_from_controls, tree_from_controls
 from cbrrt_ompl.settings import State
 from cbrrt_ompl.trajectory import Trajectory
 from cbrrt_ompl.tree import Tree
 
 DRAWS_AT_ONCE = 4096
-"""Samples whose random numbers are drawn at once."""
+"""Samples whose random numbers are drawn at once, at most."""
 
 PAUSE = 0.002
 """Aim for the time between two looks at the clock [s]."""
@@ -76,7 +76,6 @@ class Search:
         self._kind = KINDS[neighbours]
         self._is_closed_loop = int(model[0]) == CLOSED_LOOP
         self._draws = np.empty((0, DRAWS))
-        self._buffer = np.empty((CANDIDATES, int(model[2]) + 1, 5))
         self._question = np.empty(3)
         self.counters = np.zeros(COUNTERS, dtype=np.int64)
         self.has_reached_goal = False
@@ -123,7 +122,6 @@ class Search:
                 m.clearances,
                 m.frame,
                 self._draws,
-                self._buffer,
                 m.answers,
                 answered,
                 self.counters,
@@ -137,7 +135,7 @@ class Search:
                 if time.perf_counter() > deadline and not answered:
                     return
             elif status == WANT_DRAWS:
-                self._draws = self._rng.random((DRAWS_AT_ONCE, DRAWS))
+                self._draws = self._rng.random((min(max(2 * len(self._draws), 256), DRAWS_AT_ONCE), DRAWS))
                 self.counters[DRAWN] = 0
             elif status == WANT_ROOM:
                 self._make_room()
@@ -150,8 +148,9 @@ class Search:
         """Double the arrays and enter the nodes into a finer index."""
         count, capacity = int(self.counters[NODES]), 2 * len(self._tree.states)
         larger = _tree_arrays(capacity, self._is_closed_loop)
-        for old, new in zip(self._tree, larger, strict=True):
-            new[: len(old)] = old
+        for name in TreeArrays._fields:
+            old = getattr(self._tree, name)
+            getattr(larger, name)[: len(old)] = old
         depth = int(self._index.occupied[0])
         self._tree = larger
         self._make_index(capacity, depth)

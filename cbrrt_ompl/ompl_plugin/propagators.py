@@ -55,7 +55,8 @@ def advance_packed(
     values: NDArray[np.float64], c0: float, c1: float, c2: float, model: NDArray[np.float64], dt: float
 ) -> None:
     """:func:`cbrrt_ompl.extension.advance` in place, for a caller in Python; values of shape (5,)."""
+    m = unpack_model(model)
     x, y, theta, v, omega, _, _ = advance(
-        values[0], values[1], values[2], values[3], values[4], (c0, c1, c2), unpack_model(model), dt
+        values[0], values[1], values[2], values[3], values[4], (c0, c1, c2), m.law, m.limits, m.gains, dt
     )
     values[0], values[1], values[2], values[3], values[4] = x, y, theta, v, omega

@@ -66,4 +66,4 @@ def vector_memory(vector: Any) -> NDArray[np.float64]:
     size = len(vector) * ctypes.sizeof(ctypes.c_double)
     if not (size > 0 and end - begin == size and storage_end >= end):
         raise ImportError("this build of OMPL lays out std::vector in another way than the wheel of ompl 1.7.0")
-    return np.frombuffer((ctypes.c_double * len(vector)).from_address(begin), dtype=np.float64)
+    return np.ctypeslib.as_array((ctypes.c_double * len(vector)).from_address(begin))

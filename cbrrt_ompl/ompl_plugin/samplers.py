@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from cbrrt_ompl.clearance_map import ClearanceMap, unpack_view
 from cbrrt_ompl.extension import (
     ASK,
-    CANDIDATES,
     CLOSED_LOOP,
     EXTENDED,
     REFUSED,
@@ -53,7 +52,6 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         self._model, self._map = model, clearance_map
         unpacked = unpack_model.py_func(model)
         self._control_dimension = 3 if unpacked.law == CLOSED_LOOP else 2
-        self._states = np.empty((CANDIDATES, unpacked.steps + 1, STATE_DIMENSION))
         self._outcome = np.empty(OUTCOME_SIZE)
         self._first_child: dict[bytes, int] = {}
         self._following = np.empty(64, dtype=np.int32)
@@ -74,11 +72,11 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
             self.refused += status == REFUSED
             return 0
         outcome = self._outcome.tolist()
-        self._remember(node, outcome[2], outcome[3])
+        self._remember(node, outcome[1], outcome[2])
         for i in range(self._control_dimension):
-            control[i] = outcome[4 + i]
+            control[i] = outcome[3 + i]
         self._sample.write(dest)
-        return int(outcome[1])
+        return int(outcome[0])
 
     def _extend(self, first: int, answered: int = 0) -> int:
         """Run the kernel on the present node and sample."""
@@ -93,7 +91,6 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
             m.children,
             m.clearances,
             m.frame,
-            self._states,
             m.answers,
             answered,
             self._outcome,
@@ -103,7 +100,7 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         """Answer the kernel's questions by FCL until it has none."""
         status, answered = ASK, 0
         while status == ASK:
-            x, y, theta = self._outcome[4:7].tolist()
+            x, y, theta = self._outcome[3:6].tolist()
             answered = self._map.answer(answered, x, y, theta)
             status = self._extend(first, answered)
         return status
@@ -128,8 +125,8 @@ class SteeringDirectedControlSampler(ExtensionSampler):
     """S-RRT: full speed at the best of three steering rates."""
 
 
-OUTCOME_SIZE = 7
-"""Numbers of an outcome: candidate, steps, command (2), control or pose in question (3)."""
+OUTCOME_SIZE = 6
+"""Numbers of an outcome: steps, command (2), control or pose in question (3)."""
 
 
 @njit(cache=True)
@@ -143,16 +140,13 @@ def extend_packed(
     children: NDArray[np.int32],
     clearances: NDArray[np.float64],
     frame: NDArray[np.float64],
-    states: NDArray[np.float64],
     answers: NDArray[np.float64],
     answered: int,
     outcome: NDArray[np.float64],
 ) -> int:
     """:func:`cbrrt_ompl.extension.extend` for a caller in Python: flat arrays in, outcome and last state out."""
-    for i in range(len(node)):
-        states[0, 0, i] = node[i]
-    status, chosen, count, v, omega, control = extend(
-        states,
+    extension = extend(
+        (node[0], node[1], node[2], node[3], node[4]),
         sample[0],
         sample[1],
         first,
@@ -163,9 +157,9 @@ def extend_packed(
         answers,
         answered,
     )
-    outcome[0], outcome[1], outcome[2], outcome[3] = chosen, count, v, omega
-    outcome[4], outcome[5], outcome[6] = control
-    if status == EXTENDED:
-        for i in range(len(sample)):
-            sample[i] = states[chosen, count, i]
-    return status
+    outcome[0] = extension.steps
+    outcome[1], outcome[2] = extension.command
+    outcome[3], outcome[4], outcome[5] = extension.control
+    if extension.outcome == EXTENDED:
+        sample[0], sample[1], sample[2], sample[3], sample[4] = extension.state
+    return extension.outcome

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from cbrrt_ompl.ompl_plugin.binding import ob, oc
 from cbrrt_ompl.kinematics import wrap_angle
+from cbrrt_ompl.ompl_plugin.binding import ob, oc
 from cbrrt_ompl.robot import Limits
 from cbrrt_ompl.settings import State
 from cbrrt_ompl.world import Bounds
