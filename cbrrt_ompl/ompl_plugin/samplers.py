@@ -163,3 +163,21 @@ def extend_packed(
     if extension.outcome == EXTENDED:
         sample[0], sample[1], sample[2], sample[3], sample[4] = extension.state
     return extension.outcome
+
+
+def warm_up_sampler(model: NDArray[np.float64], clearance_map: ClearanceMap) -> None:
+    """Load or compile the samplers' kernel."""
+    extend_packed(
+        np.array([0.5, 0.5, 0.0, 0.0, 0.0]),
+        np.array([0.6, 0.6, 0.0, 0.0, 0.0]),
+        -1,
+        np.empty(1, dtype=np.int32),
+        np.empty((1, 2)),
+        model,
+        clearance_map.children,
+        clearance_map.clearances,
+        clearance_map.frame,
+        clearance_map.answers,
+        0,
+        np.empty(OUTCOME_SIZE),
+    )
