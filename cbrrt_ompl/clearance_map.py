@@ -245,7 +245,7 @@ class ClearanceMap:
         return has_grown
 
     def _is_hopeless(self, cell: int, x: float, y: float) -> bool:
-        """Whether a position is certainly nearer to an obstacle than the footprint's outer radius, and not its inner."""
+        """Whether a position is certainly between the two radii of the footprint, where no cell can decide it."""
         x_asked, y_asked, clearance = self.clearances[cell].tolist()
         distance = math.hypot(x - x_asked, y - y_asked)
         inner, outer = self.frame[5:7].tolist()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from cbrrt_ompl.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.world import Bounds, World
 
 
-@lru_cache(maxsize=None)
+@cache
 def warm_up(needs_ompl: bool) -> None:
     """Make all kernels ready that a planner needs: some seconds once after installation, milliseconds ever after.
 
