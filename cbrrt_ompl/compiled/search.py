@@ -26,7 +26,7 @@ from cbrrt_ompl.compiled.growth import (
     rebuild_index,
 )
 from cbrrt_ompl.compiled.nearest import GRID, KD_TREE, KINDS, Index
-from cbrrt_ompl.extension import CLOSED_LOOP
+from cbrrt_ompl.extension import CLOSED_LOOP, SCRATCH_SHAPE
 from cbrrt_ompl.replay import trajectory_from_controls, tree_from_controls
 from cbrrt_ompl.settings import State
 from cbrrt_ompl.trajectory import Trajectory
@@ -77,6 +77,7 @@ class Search:
         self._is_closed_loop = int(model[0]) == CLOSED_LOOP
         self._draws = np.empty((0, DRAWS))
         self._question = np.empty(3)
+        self._scratch = np.empty(SCRATCH_SHAPE)
         self.counters = np.zeros(COUNTERS, dtype=np.int64)
         self.has_reached_goal = False
         self._tree = _tree_arrays(FIRST_CAPACITY, self._is_closed_loop)
@@ -127,6 +128,7 @@ class Search:
                 self.counters,
                 last_sample,
                 self._question,
+                self._scratch,
             )
             if status == WANT_ANSWER:
                 now_at = self.samples

@@ -14,6 +14,7 @@ from cbrrt_ompl.extension import (
     CLOSED_LOOP,
     EXTENDED,
     REFUSED,
+    SCRATCH_SHAPE,
     extend,
     unpack_model,
 )
@@ -53,6 +54,7 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         unpacked = unpack_model.py_func(model)
         self._control_dimension = 3 if unpacked.law == CLOSED_LOOP else 2
         self._outcome = np.empty(OUTCOME_SIZE)
+        self._scratch = np.empty(SCRATCH_SHAPE)
         self._first_child: dict[bytes, int] = {}
         self._following = np.empty(64, dtype=np.int32)
         self._commands = np.empty((64, 2))
@@ -94,6 +96,7 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
             m.answers,
             answered,
             self._outcome,
+            self._scratch,
         )
 
     def _ask_and_extend(self, first: int) -> int:
@@ -143,6 +146,7 @@ def extend_packed(
     answers: NDArray[np.float64],
     answered: int,
     outcome: NDArray[np.float64],
+    scratch: NDArray[np.float64],
 ) -> int:
     """:func:`cbrrt_ompl.extension.extend` for a caller in Python: flat arrays in, outcome and last state out."""
     extension = extend(
@@ -156,6 +160,7 @@ def extend_packed(
         unpack_view(children, clearances, frame),
         answers,
         answered,
+        scratch,
     )
     outcome[0] = extension.steps
     outcome[1], outcome[2] = extension.command
@@ -180,4 +185,5 @@ def warm_up_sampler(model: NDArray[np.float64], clearance_map: ClearanceMap) -> 
         clearance_map.answers,
         0,
         np.empty(OUTCOME_SIZE),
+        np.empty(SCRATCH_SHAPE),
     )
