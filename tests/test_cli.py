@@ -352,7 +352,7 @@ def test_the_demo_writes_figures_trajectories_and_table(
     names |= {"paper_case1.yaml", "paper_case2.yaml", "results.md"}
     names |= {"paper_case2_cb-rrt_velocities.png", "paper_case2_cb-rrt-compiled_velocities.png"}
     assert {path.name for path in output.iterdir()} == names
-    assert (output / "results.md").read_text(encoding="utf-8").count("| paper_case") == 3
+    assert (output / "results.md").read_text(encoding="utf-8").count("| paper_case") == 6
 
 
 def test_the_demo_expects_s_rrt_to_fail_in_case_2(scenarios: Path) -> None:
