@@ -108,7 +108,7 @@ class Search:
     def _grow(self, last_sample: int, deadline: float) -> None:
         """Run the loop up to a number of samples, or until the deadline passes while FCL is asked."""
         t, m = self._tree, self._map
-        answered, asked_at = 0, -1
+        answered, asked_at, first_sample = 0, -1, self.samples
         while True:
             status = grow(
                 *t,
@@ -131,11 +131,11 @@ class Search:
                 self._scratch,
             )
             if status == WANT_ANSWER:
-                now_at = self.samples
-                answered = m.answer(answered if now_at == asked_at else 0, *self._question.tolist())
-                asked_at = now_at
-                if time.perf_counter() > deadline and not answered:
-                    return
+                if self.samples != asked_at:  # a new extension
+                    if self.samples > first_sample and time.perf_counter() > deadline:
+                        return
+                    answered, asked_at = 0, self.samples
+                answered = m.answer(answered, *self._question.tolist())
             elif status == WANT_DRAWS:
                 self._draws = self._rng.random((min(max(2 * len(self._draws), 256), DRAWS_AT_ONCE), DRAWS))
                 self.counters[DRAWN] = 0
