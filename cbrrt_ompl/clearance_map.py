@@ -158,11 +158,11 @@ class ClearanceMap:
             inner = -math.inf  # the origin is beside the footprint, and may well be inside an obstacle
         outer = footprint.circumscribed_radius + MITRE_LIMIT * CONTACT_TOLERANCE
         self.frame = np.array([*bounds.min, *bounds.max, size, inner, outer, footprint.is_round], dtype=float)
-        self.answers = np.empty((64, 4))
+        self.answers: NDArray[np.float64] = np.empty((64, 4))
         self._margins: dict[tuple[float, float, float], float] = {}
         self._cells = 1 if enabled else 0
-        self.children = np.zeros(self._cells, dtype=np.int32)
-        self.clearances = np.zeros((self._cells, 3))
+        self.children: NDArray[np.int32] = np.zeros(self._cells, dtype=np.int32)
+        self.clearances: NDArray[np.float64] = np.zeros((self._cells, 3))
         if enabled:
             self._ask_clearance(0, bounds.min[0] + 0.5 * size, bounds.min[1] + 0.5 * size)
 

@@ -75,7 +75,7 @@ class Search:
         self._goal_bias = goal_bias
         self._kind = KINDS[neighbours]
         self._is_closed_loop = int(model[0]) == CLOSED_LOOP
-        self._draws = np.empty((0, DRAWS))
+        self._draws: NDArray[np.float64] = np.empty((0, DRAWS))
         self._question = np.empty(3)
         self._scratch = np.empty(SCRATCH_SHAPE)
         self.counters = np.zeros(COUNTERS, dtype=np.int64)

@@ -56,8 +56,8 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         self._outcome = np.empty(OUTCOME_SIZE)
         self._scratch = np.empty(SCRATCH_SHAPE)
         self._first_child: dict[bytes, int] = {}
-        self._following = np.empty(64, dtype=np.int32)
-        self._commands = np.empty((64, 2))
+        self._following: NDArray[np.int32] = np.empty(64, dtype=np.int32)
+        self._commands: NDArray[np.float64] = np.empty((64, 2))
         self.children = 0
 
     def sampleTo(self, control: Any, *states: Any) -> int:  # noqa: N802  # OMPL's name
