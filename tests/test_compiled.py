@@ -352,6 +352,7 @@ def test_benchmark_runs_a_compiled_planner_beside_one_of_ompl(tmp_path: Path) ->
     benchmark.addPlanner(oc.RRT(setup.getSpaceInformation()))
     request = ot.Benchmark.Request()
     request.maxTime, request.maxMem, request.runCount, request.displayProgress = 2.0, 4000.0, 3, False
+    request.saveConsoleOutput = False
     benchmark.benchmark(request)
     log = tmp_path / "benchmark.log"
     assert benchmark.saveResultsToFile(str(log))
