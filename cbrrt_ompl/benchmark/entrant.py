@@ -1,0 +1,127 @@
+"""A planner of ours or of OMPL's as OMPL's Benchmark runs it: afresh from a seed, and counted."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+from cbrrt_ompl.clearance_map import ClearanceMap
+from cbrrt_ompl.compiled.growth import REFUSALS
+from cbrrt_ompl.compiled.planner import CompiledPlanner
+from cbrrt_ompl.ompl_plugin.binding import ob, ou
+from cbrrt_ompl.ompl_plugin.setup import (
+    COMPILED_PLANNERS,
+    Equipment,
+    equip,
+    first_solution_objective,
+    make_planner,
+)
+from cbrrt_ompl.scenario import Scenario
+
+
+class Entrant(ob.Planner):  # type: ignore[misc]  # OMPL has no type information
+    """Takes part in a Benchmark for another planner, of which it makes a new one for every run.
+
+    OMPL's Benchmark keeps one planner for all of its runs. The state of that planner's random numbers then depends on
+    the runs before, and Syclop's ``clear`` drops its edge costs for good. A new planner a run, made from the run's seed
+    as :func:`cbrrt_ompl.plan` makes it, repeats ``plan`` with that seed, and samples can be counted and limited.
+
+    Attributes:
+        time_limit: time that a run may take [s]; OMPL's own condition looks at the clock ten times a second only.
+        equipment: what the planner was given at the switch to it; None before.
+        planner: the planner of the present run; None before the first.
+        planning_time: time of the last search alone [s].
+    """
+
+    def __init__(self, setup: Any, scenario: Scenario, name: str, clearance_map: ClearanceMap) -> None:
+        """Enter a planner.
+
+        Args:
+            setup: the ``SimpleSetup`` that all planners of the Benchmark share.
+            scenario: world, robot, start, goal and settings.
+            name: the planner's name.
+            clearance_map: of the scenario's world and footprint.
+        """
+        super().__init__(setup.getSpaceInformation(), name)
+        self.time_limit = math.inf
+        self.equipment: Equipment | None = None
+        self.planner: Any = None
+        self.planning_time = 0.0
+        self._setup, self._scenario, self._map = setup, scenario, clearance_map
+        self._rounds = 0
+
+    def equip(self) -> None:
+        """Give the shared space information this planner's propagator and sampler, and take away all others."""
+        space = self._setup.getStateSpace()
+        self.equipment = equip(self.getSpaceInformation(), space, self._scenario, self.getName(), self._map)
+        if self.getName() == "sst":
+            self._setup.setOptimizationObjective(first_solution_objective(self.getSpaceInformation()))
+
+    def prepare(self, seed: int) -> None:
+        """Make the planner of a run; outside of the measured time."""
+        assert self.equipment is not None
+        self.equipment.sampler = None
+        ou.RNG.setSeed(seed + 1)
+        self.planner = self._make(seed)
+        space = self._setup.getStateSpace()
+        space.registerDefaultProjection(ob.SubspaceProjectionEvaluator(space, 0))  # the old one knows random bounds
+        self.getSpaceInformation().setup()
+        self.planner.setProblemDefinition(self._setup.getProblemDefinition())
+        self.planner.setup()
+
+    def clear(self) -> None:
+        """Forget the run."""
+        super().clear()
+        self.planner = None
+
+    def solve(self, condition: Any) -> Any:
+        """Run the planner until it ends, the condition holds, or ``max_samples`` are drawn."""
+        self._rounds = 0
+        inner = ob.PlannerTerminationCondition(ob.PlannerTerminationConditionFn(self._stop_condition(condition)))
+        began = time.perf_counter()
+        status = self.planner.solve(inner)
+        self.planning_time = time.perf_counter() - began
+        return status
+
+    def getPlannerData(self, data: Any) -> None:  # noqa: N802  # OMPL's name
+        """Nodes and edges of the run's planner."""
+        if self.planner is not None:
+            self.planner.getPlannerData(data)
+
+    @property
+    def samples(self) -> int:
+        """Samples drawn in this run; for OMPL's own planners the rounds of their main loop."""
+        if isinstance(self.planner, CompiledPlanner):
+            return self.planner.search.samples if self.planner.search is not None else 0
+        sampler = self.equipment.sampler if self.equipment is not None else None
+        return self._rounds if sampler is None else sampler.samples
+
+    @property
+    def extension_attempts(self) -> int:
+        """Extensions that were driven: the samples of this run but those refused by line 5 of Algorithm II."""
+        if isinstance(self.planner, CompiledPlanner):
+            return self.samples - int(self.planner.search.counters[REFUSALS]) if self.planner.search is not None else 0
+        sampler = self.equipment.sampler if self.equipment is not None else None
+        return self.samples - (0 if sampler is None else sampler.refused)
+
+    def _make(self, seed: int) -> Any:
+        """A new planner."""
+        si, name = self.getSpaceInformation(), self.getName()
+        if name in COMPILED_PLANNERS:
+            return CompiledPlanner(si, self._scenario, name, self._map, seed)
+        return make_planner(si, self._scenario, name, self._map)
+
+    def _stop_condition(self, condition: Any) -> Callable[[], bool]:
+        """OMPL's condition, the limit of time and, where OMPL does the sampling, that of samples."""
+        limit = math.inf if self.getName() in COMPILED_PLANNERS else self._scenario.planning.max_samples
+        end = time.perf_counter() + self.time_limit
+
+        def should_stop() -> bool:
+            if self._rounds >= limit or time.perf_counter() >= end or condition():
+                return True
+            self._rounds += 1
+            return False
+
+        return should_stop

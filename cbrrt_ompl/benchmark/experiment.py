@@ -1,0 +1,186 @@
+"""OMPL's Benchmark in one scenario: planners side by side, columns of our own for each run."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cbrrt_ompl.benchmark.columns import search_columns, trajectory_columns
+from cbrrt_ompl.benchmark.entrant import Entrant
+from cbrrt_ompl.benchmark.log import Log, PlannerLog, read_log
+from cbrrt_ompl.clearance_map import ClearanceMap, clearance_map_for
+from cbrrt_ompl.errors import InputError, Problem, SettingsError, UnknownPlannerError
+from cbrrt_ompl.extension import CLOSED_LOOP, law_of
+from cbrrt_ompl.obstacles import Bounds
+from cbrrt_ompl.ompl_plugin.binding import ot, ou
+from cbrrt_ompl.ompl_plugin.results import trajectory_from_path
+from cbrrt_ompl.ompl_plugin.run import quiet_ompl
+from cbrrt_ompl.ompl_plugin.setup import make_equipped_setup
+from cbrrt_ompl.planning import PLANNERS, plan
+from cbrrt_ompl.scenario import Scenario
+from cbrrt_ompl.trajectory import Trajectory
+
+MEMORY_LIMIT = 4096.0
+"""Memory that a run may take [MB]."""
+
+WARM_UP = 0.01
+"""Planning time of a run before the measured ones, so that none of them waits for the compiler [s]."""
+
+SURVEYED_POSES = 20_000
+"""Random poses that the clearance map has to decide before the measured runs."""
+
+PREFIX = "control_"
+"""What OMPL's Benchmark puts before the names of control planners."""
+
+PROPERTIES = "Properties of benchmarked planners:\n"
+"""Line in OMPL's account of the set-up after which the planners follow."""
+
+
+class Experiment:
+    """Planners in one scenario, all in one ``ot.Benchmark`` and on one space information.
+
+    At the switch to a planner the space information gets that planner's propagator and directed sampler and loses all
+    others; before each run a new planner is made from the run's seed.
+
+    Attributes:
+        entrants: the planners by name, in the order in which they run.
+    """
+
+    def __init__(self, scenario: Scenario, seeds: Mapping[str, Sequence[int]], name: str = "experiment") -> None:
+        """Enter the planners.
+
+        Args:
+            scenario: world, robot, start, goal and settings.
+            seeds: for each planner the seeds of its runs, as many for all.
+            name: of the experiment, without spaces.
+
+        Raises:
+            UnknownPlannerError: if a planner is not known.
+            InputError: if the planners cannot share a Benchmark.
+        """
+        check_entries(scenario, seeds)
+        self._scenario, self._seeds, self._name = scenario, seeds, name
+        clearance_map = clearance_map_for(scenario.world, scenario.robot.footprint)
+        with quiet_ompl():
+            self._setup, _ = make_equipped_setup(scenario, next(iter(seeds)), clearance_map)
+            self._setup.getSpaceInformation().clearDirectedSamplerAllocator()
+            self._setup.setup()
+        self.entrants = {planner: Entrant(self._setup, scenario, planner, clearance_map) for planner in seeds}
+        self._active = next(iter(self.entrants.values()))
+        self._run = 0
+        self._settings: dict[str, set[str]] = {}
+        self._properties: dict[str, str] = {}
+
+    def run(self, time_limit: float, memory_limit: float = MEMORY_LIMIT) -> Log:
+        """Run all planners, one after the other.
+
+        Args:
+            time_limit: time that a run may take [s].
+            memory_limit: memory that a run may take [MB].
+
+        Returns:
+            OMPL's log, with settings and properties of the planners themselves instead of those of their entrants.
+        """
+        survey(clearance_map_for(self._scenario.world, self._scenario.robot.footprint), self._scenario.world.bounds)
+        for name in self.entrants:
+            plan(self._scenario, name, seed=0, time_limit=WARM_UP)
+        benchmark = ot.Benchmark(self._setup, self._name)
+        benchmark.addExperimentParameter("scenario", "VARCHAR(512)", self._scenario.name.replace(" = ", "="))
+        benchmark.addExperimentParameter("max_samples", "INTEGER", str(self._scenario.planning.max_samples))
+        for entrant in self.entrants.values():
+            entrant.time_limit = time_limit
+            benchmark.addPlanner(entrant)
+        benchmark.setPlannerSwitchEvent(ot.PreSetupEvent(self._switch))
+        benchmark.setPreRunEvent(ot.PreSetupEvent(self._prepare))
+        benchmark.setPostRunEvent(ot.PostSetupEvent(self._note))
+        request = ot.Benchmark.Request(
+            maxTime=time_limit,
+            maxMem=memory_limit,
+            runCount=len(next(iter(self._seeds.values()))),
+            displayProgress=False,
+            saveConsoleOutput=False,
+            simplify=False,
+        )
+        with quiet_ompl(), tempfile.TemporaryDirectory() as folder:
+            benchmark.benchmark(request)
+            path = Path(folder, "benchmark.log")
+            benchmark.saveResultsToFile(str(path))
+            return self._completed(read_log(path))
+
+    def _switch(self, planner: Any) -> None:
+        """OMPL turns to another planner."""
+        self._active, self._run = self.entrants[planner.getName()], 0
+        self._active.equip()
+
+    def _prepare(self, planner: Any) -> None:
+        """OMPL is about to start a run."""
+        name = planner.getName()
+        self._active.prepare(self._seeds[name][self._run])
+        settings = ou.mapStringToString()
+        self._active.planner.params().getParams(settings)
+        self._settings[name] = {f"{item.key()} = {item.data()}" for item in settings}
+        self._properties[name] = self._active.planner.properties()
+
+    def _note(self, planner: Any, run: Any) -> None:
+        """OMPL has ended a run: add our columns."""
+        entrant, seed = self._active, self._seeds[planner.getName()][self._run]
+        max_samples = self._scenario.planning.max_samples
+        columns = search_columns(
+            seed, entrant.planning_time, entrant.samples, entrant.extension_attempts, max_samples
+        ) | trajectory_columns(self._trajectory(), self._scenario)
+        for column, value in columns.items():
+            run[column] = value
+        self._run += 1
+
+    def _trajectory(self) -> Trajectory | None:
+        """What the present run has found."""
+        if not self._setup.haveExactSolutionPath():
+            return None
+        assert self._active.equipment is not None
+        return trajectory_from_path(
+            self._setup.getSolutionPath(), self._setup.getStateSpace(), self._active.equipment.model
+        )
+
+    def _completed(self, log: Log) -> Log:
+        """The log with what the entrants hide."""
+        setup = log.setup.partition(PROPERTIES)[0] + PROPERTIES + "".join(self._properties.values())
+        return replace(log, setup=setup, planners=tuple(self._with_settings(planner) for planner in log.planners))
+
+    def _with_settings(self, planner: PlannerLog) -> PlannerLog:
+        settings = {*planner.settings, *self._settings[planner.name.removeprefix(PREFIX)]}
+        return replace(planner, settings=tuple(sorted(settings)))
+
+
+def survey(clearance_map: ClearanceMap, bounds: Bounds) -> None:
+    """Let a clearance map learn where the obstacles are, so that the first runs do not pay for all later ones.
+
+    Args:
+        clearance_map: the map.
+        bounds: of its world.
+    """
+    low, high = (*bounds.min, -math.pi), (*bounds.max, math.pi)
+    for x, y, theta in np.random.default_rng(0).uniform(low, high, (SURVEYED_POSES, 3)).tolist():
+        clearance_map.collides(x, y, theta)
+
+
+def check_entries(scenario: Scenario, seeds: Mapping[str, Sequence[int]]) -> None:
+    """Refuse planners that cannot share a Benchmark.
+
+    Raises:
+        UnknownPlannerError: if a planner is not known.
+        InputError: if there is none, if they differ in their number of runs, or in what steers them.
+    """
+    for name in seeds:
+        if name not in PLANNERS:
+            raise UnknownPlannerError(name, list(PLANNERS))
+    if len({len(runs) for runs in seeds.values()}) != 1 or not all(seeds.values()):
+        raise InputError(Problem("seeds", {name: len(runs) for name, runs in seeds.items()}, "as many runs for all"))
+    if len({law_of(name, scenario.planning) == CLOSED_LOOP for name in seeds}) > 1:
+        expected = "cb-rrt and cb-rrt-compiled alone in closed loop: they steer by references, the others by velocities"
+        raise SettingsError(Problem("planners", ", ".join(seeds), expected))
