@@ -1,4 +1,4 @@
-"""The command line: ``cbrrt plan | verify | show | planners | demo``.
+"""The command line: ``cbrrt plan | verify | show | planners | bench | report | demo``.
 
 Exit codes: 0 done, 1 not solved or not verified, 2 bad input, 130 interrupted. Modules that take long to import are
 imported where they are used, so that ``cbrrt --help`` answers at once.
@@ -13,8 +13,9 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 DONE, FAILED, BAD_INPUT, INTERRUPTED, BROKEN_PIPE = 0, 1, 2, 130, 141
 TRAJECTORY_SUFFIXES = (".csv", ".npz", ".json")
 FIGURE_SUFFIXES = (".png", ".pdf", ".svg")
+DATABASE_SUFFIXES = (".db", ".sqlite", ".sqlite3")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -66,6 +68,8 @@ def build_parser() -> argparse.ArgumentParser:
     _add_verify(commands)
     _add_show(commands)
     _add_planners(commands)
+    _add_bench(commands)
+    _add_report(commands)
     _add_demo(commands)
     return parser
 
@@ -102,6 +106,48 @@ def _add_show(commands: Any) -> None:
 
 def _add_planners(commands: Any) -> None:
     _add_command(commands, "planners", _planners, "list the planners", "cbrrt planners")
+
+
+def _add_bench(commands: Any) -> None:
+    example = (
+        "cbrrt bench scenarios/paper_case1.yaml scenarios/maze.yaml --planner cb-rrt s-rrt rrt --runs 20 "
+        "--time-limit 2 --database bench.db --log-dir logs"
+    )
+    summary = "run planners in scenarios many times, in OMPL's Benchmark"
+    parser = _add_command(commands, "bench", _bench, summary, example)
+    parser.add_argument("scenarios", type=Path, nargs="+", metavar="SCENARIO", help="scenario files (YAML)")
+    parser.add_argument(
+        "--planner", nargs="+", action="extend", metavar="NAME", help="see 'cbrrt planners' (default: all of them)"
+    )
+    parser.add_argument(
+        "--runs", type=_count, default=20, metavar="N", help="runs of each planner in each scenario (default: 20)"
+    )
+    parser.add_argument(
+        "--time-limit", type=_seconds, default=5.0, metavar="S", help="time of a run at most [s] (default: 5)"
+    )
+    parser.add_argument("--database", type=Path, required=True, metavar="FILE", help="database to make: .db")
+    parser.add_argument(
+        "--log-dir", type=Path, required=True, metavar="DIR",
+        help="folder for OMPL's logs; the same command goes on from what it holds",
+    )  # fmt: skip
+    parser.add_argument("--seed", type=_seed, default=1, metavar="N", help="seed of the whole series (default: 1)")
+    parser.add_argument("--jobs", type=_count, metavar="J", help="processes at a time (default: one a processor)")
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS",
+        help="run on the workers of this dask.distributed scheduler; 'local' makes a cluster of J workers",
+    )  # fmt: skip
+
+
+def _add_report(commands: Any) -> None:
+    summary = "make tables and charts from a benchmark database"
+    parser = _add_command(commands, "report", _report, summary, "cbrrt report bench.db --output report")
+    parser.add_argument("database", type=Path, metavar="DB", help="database of 'cbrrt bench'")
+    parser.add_argument(
+        "--output", type=Path, default=Path("report"), metavar="DIR", help="folder for tables and charts"
+    )
+    parser.add_argument(
+        "--reference", metavar="NAME", help="planner to compare the others with (default: cb-rrt, if it is there)"
+    )
 
 
 def _add_demo(commands: Any) -> None:
@@ -206,6 +252,44 @@ def _planners(arguments: argparse.Namespace) -> int:
     return DONE
 
 
+def _bench(arguments: argparse.Namespace) -> int:
+    """``cbrrt bench``."""
+    _check_outputs(("--database", arguments.database, DATABASE_SUFFIXES))
+    from cbrrt_ompl.benchmark.campaign import Campaign, load_scenarios, run_campaign
+    from cbrrt_ompl.benchmark.cluster import run_on_cluster
+    from cbrrt_ompl.benchmark.local import available_cores, run_locally
+    from cbrrt_ompl.planning import PLANNERS
+
+    planners = list(dict.fromkeys(arguments.planner or PLANNERS))
+    scenarios = load_scenarios(arguments.scenarios)
+    campaign = Campaign(scenarios, planners, arguments.runs, arguments.time_limit, arguments.seed)
+    jobs = arguments.jobs or available_cores()
+    runner = partial(run_locally, jobs=jobs)
+    if arguments.scheduler is not None:
+        runner = partial(run_on_cluster, address=arguments.scheduler, jobs=jobs)
+    with _run_progress(campaign.size) as progress:
+        summary = run_campaign(campaign, arguments.database, arguments.log_dir, runner, progress)
+    kept = f", {summary.kept:,} of them kept from before" if summary.kept else ""
+    counted = (("planner", planners), ("scenario", scenarios))
+    of, within = (f"{len(things)} {name}{'s' if len(things) > 1 else ''}" for name, things in counted)
+    print(f"{summary.runs:,} runs of {of} in {within}{kept}")
+    for name, reason in summary.crashes.items():
+        print(f"{name}: {reason}, see {arguments.log_dir / 'cases' / f'{name}.error'}")
+    print(f"database: {arguments.database}, logs: {arguments.log_dir}, report: cbrrt report {arguments.database}")
+    return FAILED if summary.crashes else DONE
+
+
+def _report(arguments: argparse.Namespace) -> int:
+    """``cbrrt report``."""
+    from cbrrt_ompl.benchmark.report import write_report
+
+    report = write_report(arguments.database, arguments.output, arguments.reference)
+    for line in report.invalid:
+        print(f"failed verification: {line}")
+    print(report.path)
+    return DONE
+
+
 def _demo(arguments: argparse.Namespace) -> int:
     """``cbrrt demo``."""
     arguments.output.mkdir(parents=True, exist_ok=True)
@@ -307,6 +391,26 @@ def _progress(total: int, label: str) -> Iterator[Callable[[int, float], None] |
         yield report
 
 
+@contextmanager
+def _run_progress(total: int) -> Iterator[Callable[[int], None]]:
+    """A progress line for a campaign, with the time left; silent where nobody watches."""
+    if not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    from tqdm import tqdm
+
+    with ExitStack() as stack:
+        bars: list[Any] = []
+
+        def report(done: int) -> None:
+            if not bars:  # what former calls have done tells nothing of the time left
+                bars.append(tqdm(total=total, initial=done, desc="runs", unit="", smoothing=0.0, file=sys.stderr))
+                stack.enter_context(bars[0])
+            bars[0].update(done - bars[0].n)
+
+        yield report
+
+
 def _check_outputs(*outputs: tuple[str, Path | None, tuple[str, ...]]) -> None:
     """Find out before any work whether its results can be written.
 
@@ -348,6 +452,13 @@ def _seconds(text: str) -> float:
     if not (math.isfinite(seconds) and seconds > 0.0):
         raise argparse.ArgumentTypeError(f"got {text!r}, expected a number of seconds above 0")
     return seconds
+
+
+def _count(text: str) -> int:
+    """A number of things from the command line."""
+    if not (text.isascii() and text.isdigit() and int(text) > 0):
+        raise argparse.ArgumentTypeError(f"got {text!r}, expected a whole number, 1 or more")
+    return int(text)
 
 
 def _seed(text: str) -> int:
