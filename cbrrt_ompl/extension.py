@@ -538,13 +538,19 @@ def check_step(robot: Robot, planning: PlanningSettings) -> None:
     """Refuse a step that is too long for the integrator.
 
     Raises:
-        SettingsError: if the robot can turn by more than half a radian in one step.
+        SettingsError: if the robot can turn too far in one step, or change its turn too much.
     """
-    fastest = max(-robot.limits.omega_min, robot.limits.omega_max)
-    if fastest * planning.step > MAX_TURN_PER_STEP:
-        expected = f"at most {MAX_TURN_PER_STEP / fastest:.3g} s for a robot that turns at {fastest:.3g} rad/s"
+    limits = robot.limits
+    fastest, spread = max(-limits.omega_min, limits.omega_max), limits.omega_max - limits.omega_min
+    longest_ramp = max(MAX_CHANGE_PER_STEP / spread, math.sqrt(MAX_CHANGE_PER_STEP / limits.angular_acceleration))
+    longest = min(MAX_TURN_PER_STEP / fastest, longest_ramp)
+    if planning.step > longest * (1.0 + 1e-9):
+        expected = f"at most {longest:.3g} s for a robot that turns at {fastest:.3g} rad/s"
         raise SettingsError(Problem("planning.step", planning.step, expected))
 
 
 MAX_TURN_PER_STEP = 0.5
 """Largest turn in one integration step [rad]: the error of a step then stays below 1e-5 of its length."""
+
+MAX_CHANGE_PER_STEP = 0.08
+"""Largest difference between the turns at a step's first and last turning rate [rad], for the same reason."""

@@ -85,7 +85,8 @@ class Goal:
             A line a violated condition, with the figure and the tolerance.
         """
         found = []
-        distance = math.hypot(state.x - self.x, state.y - self.y)
+        dx, dy = state.x - self.x, state.y - self.y
+        distance = math.sqrt(dx * dx + dy * dy)  # as OMPL computes it, to the last bit
         if not distance < self.tolerance:
             found.append(f"{distance:.6g} m from the goal, tolerance {self.tolerance:g} m")
         if self.theta is not None:

@@ -132,7 +132,6 @@ def test_a_time_limit_ends_a_plan_of_syclop(planner: str) -> None:
     assert result.trajectory is None
 
 
-@pytest.mark.xfail(strict=True, reason="Syclop judges 100,000 states by our checker before it asks for the time")
 @pytest.mark.parametrize("planner", [planner for planner in PLANNERS if planner.startswith("syclop")])
 def test_a_short_time_limit_is_kept_by_syclop(planner: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Counted, not timed: 10,000 states take 0.03 to 0.1 s."""
@@ -247,9 +246,7 @@ def test_the_smallest_and_the_largest_seed_are_taken(planner: str, seed: int) ->
 @pytest.mark.parametrize(
     "planner",
     [
-        pytest.param(
-            "cb-rrt", marks=pytest.mark.xfail(strict=True, reason="a NumPy integer reaches OMPL's setSeed as it is")
-        ),
+        "cb-rrt",
         "cb-rrt-compiled",
     ],
 )
@@ -290,17 +287,7 @@ def test_without_a_seed_each_plan_is_another(planner: str) -> None:
     assert fingerprint(plan(EASY, planner)) != fingerprint(plan(EASY, planner))
 
 
-@pytest.mark.parametrize(
-    "planner",
-    [
-        pytest.param(
-            planner,
-            marks=pytest.mark.xfail(strict=True, reason="seed=None leaves OMPL's generator where the last seed put it"),
-        )
-        for planner in ("cb-rrt", "rrt")
-    ]
-    + ["cb-rrt-compiled"],
-)
+@pytest.mark.parametrize("planner", ["cb-rrt", "rrt", "cb-rrt-compiled"])
 def test_a_plan_without_a_seed_is_a_fresh_one_after_a_seeded_plan(planner: str) -> None:
     fingerprints = []
     for _ in range(2):

@@ -53,7 +53,7 @@ class TreeArrays(NamedTuple):
 def add_node(tree: TreeArrays, index: Index, node: int, parent: int) -> None:
     """Link a node whose state, command and steps are there already.
 
-    A node at exactly the position of its parent becomes a twin of it, all others enter the index.
+    A node at exactly the position of its parent or of a sibling becomes a twin of it, all others enter the index.
     """
     tree.parents[node] = parent
     tree.first_child[node] = -1
@@ -63,8 +63,13 @@ def add_node(tree: TreeArrays, index: Index, node: int, parent: int) -> None:
     if parent >= 0:
         tree.siblings[node] = tree.first_child[parent]
         tree.first_child[parent] = node
-        if tree.states[node, 0] == tree.states[parent, 0] and tree.states[node, 1] == tree.states[parent, 1]:
-            place = tree.places[parent]
+        x, y = tree.states[node, 0], tree.states[node, 1]
+        near = parent
+        sibling = tree.siblings[node]
+        while sibling >= 0 and not (tree.states[near, 0] == x and tree.states[near, 1] == y):
+            near, sibling = sibling, tree.siblings[sibling]
+        if tree.states[near, 0] == x and tree.states[near, 1] == y:
+            place = tree.places[near]
             tree.places[node] = place
             tree.twins[node] = tree.twins[place]
             tree.twins[place] = node

@@ -112,9 +112,20 @@ def nearest(index: Index, x: float, y: float, count: int, stack: NDArray[np.floa
 
 
 @njit(cache=True)
+def _gap(offset: float, cell: int, cells: int, size: float) -> float:
+    """Distance along one axis from an offset [m] to a cell; the first and the last reach out to infinity."""
+    if cell > 0 and offset < cell * size:
+        return cell * size - offset
+    if cell < cells - 1 and offset > (cell + 1) * size:
+        return offset - (cell + 1) * size
+    return 0.0
+
+
+@njit(cache=True)
 def _nearest_in_grid(index: Index, x: float, y: float) -> int:
     """Search the cells in square rings around the position, as far as they hold nodes at all."""
     column, row = cell_of(index, x, y)
+    rows, columns = index.heads.shape
     left, right, low, high = index.occupied[0], index.occupied[1], index.occupied[2], index.occupied[3]
     ring = max(0, left - column, column - right, low - row, row - high)
     last_ring = max(abs(left - column), abs(right - column), abs(low - row), abs(high - row))
@@ -131,8 +142,10 @@ def _nearest_in_grid(index: Index, x: float, y: float) -> int:
         for r in range(first_row, last_row + 1):
             is_whole = r == row - ring or r == row + ring
             c = first_column if is_whole or column - ring >= left else column + ring
+            y_gap = _gap(y - index.y_min, r, rows, index.cell)
             while c <= last_column:
-                candidate = index.heads[r, c]
+                x_gap = _gap(x - index.x_min, c, columns, index.cell)
+                candidate = index.heads[r, c] if x_gap * x_gap + y_gap * y_gap < best else -1
                 while candidate >= 0:
                     dx, dy = index.states[candidate, 0] - x, index.states[candidate, 1] - y
                     squared = dx * dx + dy * dy

@@ -153,10 +153,13 @@ class Search:
         for name in TreeArrays._fields:
             old = getattr(self._tree, name)
             getattr(larger, name)[: len(old)] = old
-        depth = int(self._index.occupied[0])
+        occupied = self._index.occupied
         self._tree = larger
-        self._make_index(capacity, depth)
-        rebuild_index(larger, self._index, count)
+        self._make_index(capacity, int(occupied[0]))
+        if self._kind == GRID:
+            rebuild_index(larger, self._index, count)
+        else:
+            self._index.occupied[:] = occupied  # its links are in the arrays
 
     def _make_index(self, capacity: int, depth: int = 0) -> None:
         """An empty index with about one cell a node."""

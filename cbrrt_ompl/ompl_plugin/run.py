@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -52,9 +53,8 @@ def run(
         on_equipped: takes what the planner was given.
     """
     with quiet_ompl():
-        if seed is not None:
-            # OMPL complains about a second seed in a process; yet all that is random below is allocated from here on
-            ou.RNG.setSeed(seed + 1)
+        # OMPL complains about a second seed in a process; yet all that is random below is allocated from here on
+        ou.RNG.setSeed(1 + (secrets.randbits(31) if seed is None else int(seed)))
         clearance_map = clearance_map or clearance_map_for(scenario.world, scenario.robot.footprint)
         setup, equipment = make_equipped_setup(scenario, planner, clearance_map)
         on_equipped(equipment)
