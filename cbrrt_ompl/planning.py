@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from cbrrt_ompl.clearance_map import clearance_map_for
-from cbrrt_ompl.compiled.search import Search
+from cbrrt_ompl.compiled.search import ROBUST, Search
 from cbrrt_ompl.errors import Problem, SettingsError, UnknownPlannerError
 from cbrrt_ompl.extension import check_step, law_of, pack_model
 from cbrrt_ompl.replay import trajectory_from_controls
@@ -24,6 +24,7 @@ PLANNERS: dict[str, str] = {
     "s-rrt": "S-RRT, the paper's baseline: full speed, three steering rates; kinematic",
     "cb-rrt-compiled": "CB-RRT as one compiled loop: the same kernels, many times as fast",
     "s-rrt-compiled": "S-RRT as one compiled loop",
+    "cb-rrt-robust": "cb-rrt-compiled that passes over nodes extended in vain: for real maps",
     "rrt": "OMPL's control::RRT with random controls",
     "kpiece1": "OMPL's KPIECE1",
     "est": "OMPL's expansive space trees",
@@ -107,7 +108,7 @@ def plan(
     watch = _Watch(time_limit, progress)
     if not scenario.goal.violations(scenario.start):
         return _already_there(scenario, planner, seed)
-    if planner.endswith("-compiled"):
+    if planner.endswith("-compiled") or planner == ROBUST:
         return _plan_compiled(scenario, planner, seed, watch)
     return _plan_in_ompl(scenario, planner, seed, watch)
 
@@ -133,6 +134,7 @@ def _plan_compiled(scenario: Scenario, planner: str, seed: int | None, watch: _W
         seed,
         goal_bias=planning.goal_bias,
         neighbours=planning.nearest_neighbour,
+        robust=planner == ROBUST,
     )
     watch.start()
     search.run(watch.should_stop, planning.max_samples)

@@ -1,7 +1,12 @@
-"""The compiled loop: Algorithms I and II of the paper over flat arrays."""
+"""The compiled loop: Algorithms I and II of the paper over flat arrays.
+
+The robust kind departs from the paper in one line: what is extended is the nearest node that is not passed over, and
+the more often a place was extended, above all in vain, the likelier it is passed over (docs/robust.md).
+"""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -10,13 +15,20 @@ from numpy.typing import NDArray
 
 from cbrrt_ompl.clearance_map import unpack_view
 from cbrrt_ompl.compiled.nearest import KD_TREE, Index, insert, nearest
-from cbrrt_ompl.extension import ASK, BLOCKED, CLOSED_LOOP, REFUSED, extend, in_goal, unpack_model
+from cbrrt_ompl.extension import ASK, BLOCKED, CLOSED_LOOP, EXTENDED, REFUSED, extend, in_goal, unpack_model
 
 REACHED, WANT_ANSWER, WANT_ROOM, WANT_DRAWS, PAUSED = 0, 1, 2, 3, 4
 """Why the loop returns: a node in the goal, a question to FCL, full arrays, no random numbers left, enough for now."""
 
-DRAWS = 4
-"""Random numbers of a sample: goal bias, x, y, and the choice among nodes at one position."""
+DRAWS, ROBUST_DRAWS = 4, 5
+"""Random numbers of a sample: goal bias, x, y, the choice among nodes at one position; and how much doubt it bears."""
+
+PATIENCE, DOUBT_OF_A_NODE, DOUBT_OF_A_FAILURE = 6, 1, 2
+"""Robust: a place is passed over with the chance d / (PATIENCE + d), d the doubts about it: so many for each node that
+came from there and for each extension from there that was refused or blocked."""
+
+NOT_INDEXED = 2**31 - 1
+"""Robust: doubts about a node that its place stands for, so that brute force finds no other nodes than the indexes."""
 
 NODES, SAMPLES, DRAWN, REFUSALS, COLLISIONS = 0, 1, 2, 3, 4
 """Counters of a search: nodes, samples, rows of draws used up, extensions refused by line 5, and cut by obstacles."""
@@ -25,7 +37,7 @@ COUNTERS = 5
 
 
 class TreeArrays(NamedTuple):
-    """All that is stored of a tree: 92 bytes a node (and 24 more for the references of the closed loop)."""
+    """All that is stored of a tree: 92 bytes a node; 24 more in closed loop (references), 4 more if robust (doubts)."""
 
     states: NDArray[np.float64]
     """(x, y, theta, v, omega), shape (n, 5)."""
@@ -47,6 +59,8 @@ class TreeArrays(NamedTuple):
     """Next node at exactly the same position, -1 at the end, shape (n,)."""
     places: NDArray[np.int32]
     """The indexed node at the same position: the head of the chain of twins, shape (n,)."""
+    doubts: NDArray[np.int32]
+    """Robust: doubts about each place, kept at its indexed node, shape (n,); else of shape (0,)."""
 
 
 @njit(cache=True)
@@ -60,6 +74,8 @@ def add_node(tree: TreeArrays, index: Index, node: int, parent: int) -> None:
     tree.siblings[node] = -1
     tree.twins[node] = -1
     tree.places[node] = node
+    if len(tree.doubts) > 0:
+        tree.doubts[node] = 0
     if parent >= 0:
         tree.siblings[node] = tree.first_child[parent]
         tree.first_child[parent] = node
@@ -68,6 +84,8 @@ def add_node(tree: TreeArrays, index: Index, node: int, parent: int) -> None:
             tree.places[node] = place
             tree.twins[node] = tree.twins[place]
             tree.twins[place] = node
+            if len(tree.doubts) > 0:
+                tree.doubts[node] = NOT_INDEXED
             return
     insert(index, node)
 
@@ -95,6 +113,24 @@ def one_of_twins(tree: TreeArrays, place: int, draw: float) -> int:
 
 
 @njit(cache=True)
+def trusted_place(index: Index, x: float, y: float, count: int, stack: NDArray[np.float64], draw: float) -> int:
+    """The indexed node nearest to a position among those that are not passed over; among all where all are.
+
+    Args:
+        index: the index; not empty.
+        x: position [m].
+        y: position [m].
+        count: nodes in the tree.
+        stack: room for the k-d tree's search.
+        draw: random number in [0, 1), the same for all places: those with d doubts are passed over where it is above
+            PATIENCE / (PATIENCE + d).
+    """
+    limit = PATIENCE / draw - PATIENCE if draw > 0.0 else math.inf
+    place = nearest(index, x, y, count, stack, limit)
+    return place if place >= 0 else nearest(index, x, y, count, stack, -1.0)
+
+
+@njit(cache=True)
 def rebuild_index(tree: TreeArrays, index: Index, count: int) -> None:
     """Enter all nodes that stand for their position into an empty index."""
     for node in range(count):
@@ -114,6 +150,7 @@ def grow(
     siblings: NDArray[np.int32],
     twins: NDArray[np.int32],
     places: NDArray[np.int32],
+    doubts: NDArray[np.int32],
     heads: NDArray[np.int32],
     occupied: NDArray[np.int64],
     stack: NDArray[np.float64],
@@ -134,7 +171,7 @@ def grow(
     """Draw samples and extend the tree until something is wanted.
 
     Args:
-        states: this and the arrays up to ``places``: see :class:`TreeArrays`.
+        states: this and the arrays up to ``doubts``: see :class:`TreeArrays`.
         commands: see above.
         references: see above.
         links: see above.
@@ -144,6 +181,7 @@ def grow(
         siblings: see above.
         twins: see above.
         places: see above.
+        doubts: see above; with room for them, the tree grows robustly.
         heads: this and the next: see :class:`cbrrt_ompl.compiled.nearest.Index`.
         occupied: see above.
         stack: room for the k-d tree's search.
@@ -154,7 +192,7 @@ def grow(
         children: this and the next two: the clearance map.
         clearances: see above.
         frame: see above.
-        draws: random numbers in [0, 1), a sample a row, shape (m, DRAWS).
+        draws: random numbers in [0, 1), a sample a row, shape (m, DRAWS), or (m, ROBUST_DRAWS).
         answers: what FCL has said about the present extension.
         answered: rows of ``answers`` in use.
         counters: see `NODES`; carried from call to call, shape (COUNTERS,).
@@ -165,10 +203,11 @@ def grow(
         `REACHED` (the last node is in the goal), `WANT_ANSWER`, `WANT_ROOM`, `WANT_DRAWS` or `PAUSED`. After a question
         the same extension is repeated.
     """
-    tree = TreeArrays(states, commands, references, links, parents, steps, first_child, siblings, twins, places)
+    tree = TreeArrays(states, commands, references, links, parents, steps, first_child, siblings, twins, places, doubts)
     model = unpack_model(packed_model)
     view = unpack_view(children, clearances, frame)
-    index = Index(kind, states, links, heads, occupied, view.x_min, view.y_min, cell)
+    index = Index(kind, states, links, heads, occupied, view.x_min, view.y_min, cell, doubts)
+    is_robust = len(doubts) > 0
     width, height = view.x_max - view.x_min, view.y_max - view.y_min
     while counters[SAMPLES] < last_sample:
         if counters[NODES] == len(states) or (kind == KD_TREE and occupied[0] + 2 > len(stack)):
@@ -179,7 +218,11 @@ def grow(
         x, y = view.x_min + draw[1] * width, view.y_min + draw[2] * height
         if draw[0] < goal_bias:
             x, y = model.goal.x, model.goal.y
-        parent = one_of_twins(tree, nearest(index, x, y, counters[NODES], stack), draw[3])
+        if is_robust:
+            place = trusted_place(index, x, y, counters[NODES], stack, draw[4])
+        else:
+            place = nearest(index, x, y, counters[NODES], stack, -1.0)
+        parent = one_of_twins(tree, place, draw[3])
         origin = (
             states[parent, 0],
             states[parent, 1],
@@ -194,6 +237,8 @@ def grow(
         answered = 0
         counters[DRAWN] += 1
         counters[SAMPLES] += 1
+        if is_robust:
+            doubts[place] += DOUBT_OF_A_NODE if extension.outcome == EXTENDED else DOUBT_OF_A_FAILURE
         if extension.outcome == REFUSED:
             counters[REFUSALS] += 1
         elif extension.outcome == BLOCKED:

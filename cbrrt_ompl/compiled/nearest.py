@@ -41,6 +41,8 @@ class Index(NamedTuple):
     y_min: float
     cell: float
     """Side of a cell [m]."""
+    doubts: NDArray[np.int32]
+    """Doubts about each node, shape (n,); of shape (0,) where no node is ever passed over."""
 
 
 @njit(cache=True)
@@ -84,8 +86,14 @@ def _insert_into_kd_tree(index: Index, node: int) -> None:
         parent, axis, depth = child, 1 - axis, depth + 1
 
 
+@njit(cache=True, inline="always")
+def is_passed_over(index: Index, node: int, limit: float) -> bool:
+    """Whether the doubts about a node are above a limit; never where the limit is negative."""
+    return limit >= 0.0 and index.doubts[node] > limit
+
+
 @njit(cache=True)
-def nearest(index: Index, x: float, y: float, count: int, stack: NDArray[np.float64]) -> int:
+def nearest(index: Index, x: float, y: float, count: int, stack: NDArray[np.float64], limit: float = -1.0) -> int:
     """The indexed node nearest to a position.
 
     Args:
@@ -94,25 +102,26 @@ def nearest(index: Index, x: float, y: float, count: int, stack: NDArray[np.floa
         y: position [m].
         count: nodes in the tree, for brute force.
         stack: room for the k-d tree's search, more rows than the tree is deep, shape (m, 3).
+        limit: nodes with more doubts are passed over; negative for none.
 
     Returns:
-        Its number.
+        Its number, -1 where all are passed over.
     """
     if index.kind == GRID:
-        return _nearest_in_grid(index, x, y)
+        return _nearest_in_grid(index, x, y, limit)
     if index.kind == KD_TREE:
-        return _nearest_in_kd_tree(index, x, y, stack)
-    best, node = math.inf, 0
+        return _nearest_in_kd_tree(index, x, y, stack, limit)
+    best, node = math.inf, -1
     for i in range(count):
         dx, dy = index.states[i, 0] - x, index.states[i, 1] - y
         squared = dx * dx + dy * dy
-        if squared < best:
+        if squared < best and not is_passed_over(index, i, limit):
             best, node = squared, i
     return node
 
 
 @njit(cache=True)
-def _nearest_in_grid(index: Index, x: float, y: float) -> int:
+def _nearest_in_grid(index: Index, x: float, y: float, limit: float) -> int:
     """Search the cells in square rings around the position, as far as they hold nodes at all."""
     column, row = cell_of(index, x, y)
     left, right, low, high = index.occupied[0], index.occupied[1], index.occupied[2], index.occupied[3]
@@ -136,7 +145,7 @@ def _nearest_in_grid(index: Index, x: float, y: float) -> int:
                 while candidate >= 0:
                     dx, dy = index.states[candidate, 0] - x, index.states[candidate, 1] - y
                     squared = dx * dx + dy * dy
-                    if squared < best:
+                    if squared < best and not is_passed_over(index, candidate, limit):
                         best, node = squared, candidate
                     candidate = index.links[candidate, 0]
                 c += 1 if is_whole or c == column + ring else max(column + ring - c, 1)
@@ -145,9 +154,9 @@ def _nearest_in_grid(index: Index, x: float, y: float) -> int:
 
 
 @njit(cache=True)
-def _nearest_in_kd_tree(index: Index, x: float, y: float, stack: NDArray[np.float64]) -> int:
+def _nearest_in_kd_tree(index: Index, x: float, y: float, stack: NDArray[np.float64], limit: float) -> int:
     """Search depth first, the nearer side first, leaving out what lies beyond the best so far."""
-    best, node = math.inf, 0
+    best, node = math.inf, -1
     stack[0, 0], stack[0, 1], stack[0, 2] = 0.0, 0.0, 0.0  # node, axis, squared distance of its half plane
     depth = 1
     while depth > 0:
@@ -158,7 +167,7 @@ def _nearest_in_kd_tree(index: Index, x: float, y: float, stack: NDArray[np.floa
         while i >= 0:
             dx, dy = index.states[i, 0] - x, index.states[i, 1] - y
             squared = dx * dx + dy * dy
-            if squared < best:
+            if squared < best and not is_passed_over(index, i, limit):
                 best, node = squared, i
             offset = dx if axis == 0 else dy
             near, far = (0, 1) if offset > 0.0 else (1, 0)

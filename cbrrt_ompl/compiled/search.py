@@ -16,6 +16,7 @@ from cbrrt_ompl.compiled.growth import (
     DRAWS,
     NODES,
     REACHED,
+    ROBUST_DRAWS,
     SAMPLES,
     WANT_ANSWER,
     WANT_DRAWS,
@@ -41,6 +42,9 @@ PAUSE = 0.002
 FIRST_CAPACITY = 256
 """Nodes that a search has room for at first; doubled when full."""
 
+ROBUST = "cb-rrt-robust"
+"""Name of the planner whose search is robust."""
+
 
 class Search:
     """One tree, grown by the compiled loop.
@@ -59,6 +63,7 @@ class Search:
         *,
         goal_bias: float = 0.0,
         neighbours: str = "grid",
+        robust: bool = False,
     ) -> None:
         """Plant the start states.
 
@@ -69,17 +74,19 @@ class Search:
             seed: of the search's own generator; None draws a fresh one.
             goal_bias: share of samples that are the goal.
             neighbours: `grid`, `kd-tree` or `brute-force`.
+            robust: whether places that were extended in vain are passed over more and more.
         """
         self.model, self._map = model, clearance_map
         self._rng = np.random.default_rng(seed)
         self._goal_bias = goal_bias
         self._kind = KINDS[neighbours]
         self._is_closed_loop = int(model[0]) == CLOSED_LOOP
-        self._draws = np.empty((0, DRAWS))
+        self._is_robust = robust
+        self._draws = np.empty((0, ROBUST_DRAWS if robust else DRAWS))
         self._question = np.empty(3)
         self.counters = np.zeros(COUNTERS, dtype=np.int64)
         self.has_reached_goal = False
-        self._tree = _tree_arrays(FIRST_CAPACITY, self._is_closed_loop)
+        self._tree = _tree_arrays(FIRST_CAPACITY, self._is_closed_loop, robust)
         self._make_index(FIRST_CAPACITY)
         for node, start in enumerate(starts):
             self._tree.states[node] = start
@@ -135,7 +142,8 @@ class Search:
                 if time.perf_counter() > deadline and not answered:
                     return
             elif status == WANT_DRAWS:
-                self._draws = self._rng.random((min(max(2 * len(self._draws), 256), DRAWS_AT_ONCE), DRAWS))
+                rows, columns = self._draws.shape
+                self._draws = self._rng.random((min(max(2 * rows, 256), DRAWS_AT_ONCE), columns))
                 self.counters[DRAWN] = 0
             elif status == WANT_ROOM:
                 self._make_room()
@@ -147,7 +155,7 @@ class Search:
     def _make_room(self) -> None:
         """Double the arrays and enter the nodes into a finer index."""
         count, capacity = int(self.counters[NODES]), 2 * len(self._tree.states)
-        larger = _tree_arrays(capacity, self._is_closed_loop)
+        larger = _tree_arrays(capacity, self._is_closed_loop, self._is_robust)
         for name in TreeArrays._fields:
             old = getattr(self._tree, name)
             getattr(larger, name)[: len(old)] = old
@@ -166,7 +174,8 @@ class Search:
         heads = np.full(shape, -1, dtype=np.int32)
         limits = [2**31, -1, 2**31, -1, 0] if self._kind == GRID else [0, 0, 0, 0, 0]
         occupied = np.array(limits, dtype=np.int64)
-        self._index = Index(self._kind, self._tree.states, self._tree.links, heads, occupied, x0, y0, cell)
+        t = self._tree
+        self._index = Index(self._kind, t.states, t.links, heads, occupied, x0, y0, cell, t.doubts)
         self._stack = np.empty((2 * depth + 64 if self._kind == KD_TREE else 0, 3))
 
     @property
@@ -203,7 +212,7 @@ class Search:
         return tree_from_controls(*self.edges(), self.model)
 
 
-def _tree_arrays(capacity: int, is_closed_loop: bool) -> TreeArrays:
+def _tree_arrays(capacity: int, is_closed_loop: bool, is_robust: bool) -> TreeArrays:
     """Arrays for some nodes; their contents are undefined."""
     return TreeArrays(
         states=np.empty((capacity, 5)),
@@ -216,4 +225,5 @@ def _tree_arrays(capacity: int, is_closed_loop: bool) -> TreeArrays:
         siblings=np.empty(capacity, dtype=np.int32),
         twins=np.empty(capacity, dtype=np.int32),
         places=np.empty(capacity, dtype=np.int32),
+        doubts=np.empty(capacity if is_robust else 0, dtype=np.int32),
     )
