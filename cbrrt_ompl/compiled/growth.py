@@ -1,7 +1,7 @@
 """The compiled loop: Algorithms I and II of the paper over flat arrays.
 
-The robust kind departs from the paper in one line: what is extended is the nearest node that is not passed over, and
-the more often a place was extended, above all in vain, the likelier it is passed over (docs/robust.md).
+The robust kind departs from the paper in one line: what is extended is the nearest place that is not passed over, and
+the more extensions from a place have failed, the likelier it is passed over (docs/robust.md).
 """
 
 from __future__ import annotations
@@ -21,14 +21,11 @@ REACHED, WANT_ANSWER, WANT_ROOM, WANT_DRAWS, PAUSED = 0, 1, 2, 3, 4
 """Why the loop returns: a node in the goal, a question to FCL, full arrays, no random numbers left, enough for now."""
 
 DRAWS, ROBUST_DRAWS = 4, 5
-"""Random numbers of a sample: goal bias, x, y, the choice among nodes at one position; and how much doubt it bears."""
-
-PATIENCE, DOUBT_OF_A_NODE, DOUBT_OF_A_FAILURE = 6, 1, 2
-"""Robust: a place is passed over with the chance d / (PATIENCE + d), d the doubts about it: so many for each node that
-came from there and for each extension from there that was refused or blocked."""
+"""Random numbers of a sample: goal bias, x, y, the choice among nodes at one position; and how many
+failures of a place it bears."""
 
 NOT_INDEXED = 2**31 - 1
-"""Robust: doubts about a node that its place stands for, so that brute force finds no other nodes than the indexes."""
+"""Robust: failures of a node that its place stands for, so that brute force finds no other nodes than the indexes."""
 
 NODES, SAMPLES, DRAWN, REFUSALS, COLLISIONS = 0, 1, 2, 3, 4
 """Counters of a search: nodes, samples, rows of draws used up, extensions refused by line 5, and cut by obstacles."""
@@ -37,7 +34,7 @@ COUNTERS = 5
 
 
 class TreeArrays(NamedTuple):
-    """All that is stored of a tree: 92 bytes a node; 24 more in closed loop (references), 4 more if robust (doubts)."""
+    """All that is stored of a tree: 92 bytes a node; 24 more in closed loop (references), 4 if robust (failures)."""
 
     states: NDArray[np.float64]
     """(x, y, theta, v, omega), shape (n, 5)."""
@@ -59,8 +56,8 @@ class TreeArrays(NamedTuple):
     """Next node at exactly the same position, -1 at the end, shape (n,)."""
     places: NDArray[np.int32]
     """The indexed node at the same position: the head of the chain of twins, shape (n,)."""
-    doubts: NDArray[np.int32]
-    """Robust: doubts about each place, kept at its indexed node, shape (n,); else of shape (0,)."""
+    failures: NDArray[np.int32]
+    """Robust: failed extensions from each place, kept at its indexed node, shape (n,); else of shape (0,)."""
 
 
 @njit(cache=True)
@@ -74,8 +71,8 @@ def add_node(tree: TreeArrays, index: Index, node: int, parent: int) -> None:
     tree.siblings[node] = -1
     tree.twins[node] = -1
     tree.places[node] = node
-    if len(tree.doubts) > 0:
-        tree.doubts[node] = 0
+    if len(tree.failures) > 0:
+        tree.failures[node] = 0
     if parent >= 0:
         tree.siblings[node] = tree.first_child[parent]
         tree.first_child[parent] = node
@@ -84,8 +81,8 @@ def add_node(tree: TreeArrays, index: Index, node: int, parent: int) -> None:
             tree.places[node] = place
             tree.twins[node] = tree.twins[place]
             tree.twins[place] = node
-            if len(tree.doubts) > 0:
-                tree.doubts[node] = NOT_INDEXED
+            if len(tree.failures) > 0:
+                tree.failures[node] = NOT_INDEXED
             return
     insert(index, node)
 
@@ -113,21 +110,13 @@ def one_of_twins(tree: TreeArrays, place: int, draw: float) -> int:
 
 
 @njit(cache=True)
-def trusted_place(index: Index, x: float, y: float, count: int, stack: NDArray[np.float64], draw: float) -> int:
-    """The indexed node nearest to a position among those that are not passed over; among all where all are.
+def bearable_failures(draw: float) -> float:
+    """Most failures with which a place is not passed over: one with f failures is with the chance f / (1 + f).
 
     Args:
-        index: the index; not empty.
-        x: position [m].
-        y: position [m].
-        count: nodes in the tree.
-        stack: room for the k-d tree's search.
-        draw: random number in [0, 1), the same for all places: those with d doubts are passed over where it is above
-            PATIENCE / (PATIENCE + d).
+        draw: random number in [0, 1), the same for all places.
     """
-    limit = PATIENCE / draw - PATIENCE if draw > 0.0 else math.inf
-    place = nearest(index, x, y, count, stack, limit)
-    return place if place >= 0 else nearest(index, x, y, count, stack, -1.0)
+    return 1.0 / draw - 1.0 if draw > 0.0 else math.inf
 
 
 @njit(cache=True)
@@ -150,7 +139,7 @@ def grow(
     siblings: NDArray[np.int32],
     twins: NDArray[np.int32],
     places: NDArray[np.int32],
-    doubts: NDArray[np.int32],
+    failures: NDArray[np.int32],
     heads: NDArray[np.int32],
     occupied: NDArray[np.int64],
     stack: NDArray[np.float64],
@@ -171,7 +160,7 @@ def grow(
     """Draw samples and extend the tree until something is wanted.
 
     Args:
-        states: this and the arrays up to ``doubts``: see :class:`TreeArrays`.
+        states: this and the arrays up to ``failures``: see :class:`TreeArrays`.
         commands: see above.
         references: see above.
         links: see above.
@@ -181,7 +170,7 @@ def grow(
         siblings: see above.
         twins: see above.
         places: see above.
-        doubts: see above; with room for them, the tree grows robustly.
+        failures: see above; with room for them, the tree grows robustly.
         heads: this and the next: see :class:`cbrrt_ompl.compiled.nearest.Index`.
         occupied: see above.
         stack: room for the k-d tree's search.
@@ -203,11 +192,13 @@ def grow(
         `REACHED` (the last node is in the goal), `WANT_ANSWER`, `WANT_ROOM`, `WANT_DRAWS` or `PAUSED`. After a question
         the same extension is repeated.
     """
-    tree = TreeArrays(states, commands, references, links, parents, steps, first_child, siblings, twins, places, doubts)
+    tree = TreeArrays(
+        states, commands, references, links, parents, steps, first_child, siblings, twins, places, failures
+    )
     model = unpack_model(packed_model)
     view = unpack_view(children, clearances, frame)
-    index = Index(kind, states, links, heads, occupied, view.x_min, view.y_min, cell, doubts)
-    is_robust = len(doubts) > 0
+    index = Index(kind, states, links, heads, occupied, view.x_min, view.y_min, cell, failures)
+    is_robust = len(failures) > 0
     width, height = view.x_max - view.x_min, view.y_max - view.y_min
     while counters[SAMPLES] < last_sample:
         if counters[NODES] == len(states) or (kind == KD_TREE and occupied[0] + 2 > len(stack)):
@@ -218,10 +209,8 @@ def grow(
         x, y = view.x_min + draw[1] * width, view.y_min + draw[2] * height
         if draw[0] < goal_bias:
             x, y = model.goal.x, model.goal.y
-        if is_robust:
-            place = trusted_place(index, x, y, counters[NODES], stack, draw[4])
-        else:
-            place = nearest(index, x, y, counters[NODES], stack, -1.0)
+        limit = bearable_failures(draw[4]) if is_robust else -1.0
+        place = max(nearest(index, x, y, counters[NODES], stack, limit), 0)  # the root where all are passed over
         parent = one_of_twins(tree, place, draw[3])
         origin = (
             states[parent, 0],
@@ -237,8 +226,8 @@ def grow(
         answered = 0
         counters[DRAWN] += 1
         counters[SAMPLES] += 1
-        if is_robust:
-            doubts[place] += DOUBT_OF_A_NODE if extension.outcome == EXTENDED else DOUBT_OF_A_FAILURE
+        if is_robust and extension.outcome != EXTENDED:
+            failures[place] += 1
         if extension.outcome == REFUSED:
             counters[REFUSALS] += 1
         elif extension.outcome == BLOCKED:

@@ -41,8 +41,8 @@ class Index(NamedTuple):
     y_min: float
     cell: float
     """Side of a cell [m]."""
-    doubts: NDArray[np.int32]
-    """Doubts about each node, shape (n,); of shape (0,) where no node is ever passed over."""
+    failures: NDArray[np.int32]
+    """Failed extensions from each node, shape (n,); of shape (0,) where no node is ever passed over."""
 
 
 @njit(cache=True)
@@ -88,12 +88,12 @@ def _insert_into_kd_tree(index: Index, node: int) -> None:
 
 @njit(cache=True, inline="always")
 def is_passed_over(index: Index, node: int, limit: float) -> bool:
-    """Whether the doubts about a node are above a limit; never where the limit is negative."""
-    return limit >= 0.0 and index.doubts[node] > limit
+    """Whether the failures of a node are above a limit; never where the limit is negative."""
+    return limit >= 0.0 and index.failures[node] > limit
 
 
 @njit(cache=True)
-def nearest(index: Index, x: float, y: float, count: int, stack: NDArray[np.float64], limit: float = -1.0) -> int:
+def nearest(index: Index, x: float, y: float, count: int, stack: NDArray[np.float64], limit: float) -> int:
     """The indexed node nearest to a position.
 
     Args:
@@ -102,7 +102,7 @@ def nearest(index: Index, x: float, y: float, count: int, stack: NDArray[np.floa
         y: position [m].
         count: nodes in the tree, for brute force.
         stack: room for the k-d tree's search, more rows than the tree is deep, shape (m, 3).
-        limit: nodes with more doubts are passed over; negative for none.
+        limit: nodes with more failures are passed over; negative for none.
 
     Returns:
         Its number, -1 where all are passed over.

@@ -74,7 +74,7 @@ class Search:
             seed: of the search's own generator; None draws a fresh one.
             goal_bias: share of samples that are the goal.
             neighbours: `grid`, `kd-tree` or `brute-force`.
-            robust: whether places that were extended in vain are passed over more and more.
+            robust: whether places are passed over the likelier, the more extensions from there have failed.
         """
         self.model, self._map = model, clearance_map
         self._rng = np.random.default_rng(seed)
@@ -175,7 +175,7 @@ class Search:
         limits = [2**31, -1, 2**31, -1, 0] if self._kind == GRID else [0, 0, 0, 0, 0]
         occupied = np.array(limits, dtype=np.int64)
         t = self._tree
-        self._index = Index(self._kind, t.states, t.links, heads, occupied, x0, y0, cell, t.doubts)
+        self._index = Index(self._kind, t.states, t.links, heads, occupied, x0, y0, cell, t.failures)
         self._stack = np.empty((2 * depth + 64 if self._kind == KD_TREE else 0, 3))
 
     @property
@@ -225,5 +225,5 @@ def _tree_arrays(capacity: int, is_closed_loop: bool, is_robust: bool) -> TreeAr
         siblings=np.empty(capacity, dtype=np.int32),
         twins=np.empty(capacity, dtype=np.int32),
         places=np.empty(capacity, dtype=np.int32),
-        doubts=np.empty(capacity if is_robust else 0, dtype=np.int32),
+        failures=np.empty(capacity if is_robust else 0, dtype=np.int32),
     )
