@@ -87,7 +87,7 @@ def test_the_nearest_node_within_the_limit_is_found(kind: int) -> None:
 def test_no_node_is_found_where_all_have_failed_too_often(kind: int) -> None:
     index, stack = index_of(kind, np.array([[2.0, 2.0], [7.0, 7.0]]), np.array([50, 50]))
     assert nearest(index, 6.0, 6.0, 2, stack, 10.0) == -1
-    assert nearest(index, 6.0, 6.0, 2, stack, -1.0) == 1
+    assert nearest(index, 6.0, 6.0, 2, stack, None) == 1
 
 
 @pytest.mark.parametrize("failures", [0, 1, 6, 30])

@@ -209,8 +209,10 @@ def grow(
         x, y = view.x_min + draw[1] * width, view.y_min + draw[2] * height
         if draw[0] < goal_bias:
             x, y = model.goal.x, model.goal.y
-        limit = bearable_failures(draw[4]) if is_robust else -1.0
-        place = max(nearest(index, x, y, counters[NODES], stack, limit), 0)  # the root where all are passed over
+        if is_robust:  # the root where all are passed over
+            place = max(nearest(index, x, y, counters[NODES], stack, bearable_failures(draw[4])), 0)
+        else:
+            place = nearest(index, x, y, counters[NODES], stack, None)
         parent = one_of_twins(tree, place, draw[3])
         origin = (
             states[parent, 0],

@@ -86,14 +86,14 @@ def _insert_into_kd_tree(index: Index, node: int) -> None:
         parent, axis, depth = child, 1 - axis, depth + 1
 
 
-@njit(cache=True, inline="always")
-def is_passed_over(index: Index, node: int, limit: float) -> bool:
-    """Whether the failures of a node are above a limit; never where the limit is negative."""
-    return limit >= 0.0 and index.failures[node] > limit
+@njit(cache=True)
+def is_passed_over(index: Index, node: int, limit: float | None) -> bool:
+    """Whether the failures of a node are above a limit, if there is one; None costs nothing once compiled."""
+    return False if limit is None else index.failures[node] > limit
 
 
 @njit(cache=True)
-def nearest(index: Index, x: float, y: float, count: int, stack: NDArray[np.float64], limit: float) -> int:
+def nearest(index: Index, x: float, y: float, count: int, stack: NDArray[np.float64], limit: float | None) -> int:
     """The indexed node nearest to a position.
 
     Args:
@@ -102,7 +102,7 @@ def nearest(index: Index, x: float, y: float, count: int, stack: NDArray[np.floa
         y: position [m].
         count: nodes in the tree, for brute force.
         stack: room for the k-d tree's search, more rows than the tree is deep, shape (m, 3).
-        limit: nodes with more failures are passed over; negative for none.
+        limit: nodes with more failures are passed over; None for none.
 
     Returns:
         Its number, -1 where all are passed over.
@@ -121,7 +121,7 @@ def nearest(index: Index, x: float, y: float, count: int, stack: NDArray[np.floa
 
 
 @njit(cache=True)
-def _nearest_in_grid(index: Index, x: float, y: float, limit: float) -> int:
+def _nearest_in_grid(index: Index, x: float, y: float, limit: float | None) -> int:
     """Search the cells in square rings around the position, as far as they hold nodes at all."""
     column, row = cell_of(index, x, y)
     left, right, low, high = index.occupied[0], index.occupied[1], index.occupied[2], index.occupied[3]
@@ -154,7 +154,7 @@ def _nearest_in_grid(index: Index, x: float, y: float, limit: float) -> int:
 
 
 @njit(cache=True)
-def _nearest_in_kd_tree(index: Index, x: float, y: float, stack: NDArray[np.float64], limit: float) -> int:
+def _nearest_in_kd_tree(index: Index, x: float, y: float, stack: NDArray[np.float64], limit: float | None) -> int:
     """Search depth first, the nearer side first, leaving out what lies beyond the best so far."""
     best, node = math.inf, -1
     stack[0, 0], stack[0, 1], stack[0, 2] = 0.0, 0.0, 0.0  # node, axis, squared distance of its half plane
