@@ -34,14 +34,14 @@ from cbrrt_ompl.settings import NEAREST_NEIGHBOUR
 ROBUST = "cb-rrt-robust"
 
 
-def index_of(kind: int, positions: np.ndarray, failures: np.ndarray) -> tuple[Index, np.ndarray]:
+def index_of(kind: int, positions: np.ndarray) -> tuple[Index, np.ndarray]:
     """An index over positions in [0, 10) x [0, 10), and room to search it."""
     states = np.zeros((len(positions), 5))
     states[:, :2] = positions
     heads = np.full((10, 10) if kind == GRID else (1, 1), -1, dtype=np.int32)
     occupied = np.array([2**31, -1, 2**31, -1, 0] if kind == GRID else [0] * 5)
     links = np.full((len(positions), 2), -1, dtype=np.int32)
-    index = Index(kind, states, links, heads, occupied, 0.0, 0.0, 1.0, failures.astype(np.int32))
+    index = Index(kind, states, links, heads, occupied, 0.0, 0.0, 1.0)
     for node in range(len(positions)):
         insert(index, node)
     return index, np.empty((200, 3))
@@ -75,19 +75,19 @@ def blind_alley() -> Scenario:
 @pytest.mark.parametrize("kind", [GRID, KD_TREE, BRUTE_FORCE])
 def test_the_nearest_node_within_the_limit_is_found(kind: int) -> None:
     rng = np.random.default_rng(1)
-    positions, failures = rng.uniform(0.0, 10.0, (60, 2)), rng.integers(0, 20, 60)
-    index, stack = index_of(kind, positions, failures)
+    positions, failures = rng.uniform(0.0, 10.0, (60, 2)), rng.integers(0, 20, 60).astype(np.int32)
+    index, stack = index_of(kind, positions)
     for x, y, limit in rng.uniform((0.0, 0.0, 0.0), (10.0, 10.0, 20.0), (200, 3)):
         distances = np.where(failures <= limit, np.hypot(*(positions - (x, y)).T), np.inf)
         expected = int(distances.argmin()) if np.isfinite(distances).any() else -1
-        assert nearest(index, x, y, len(positions), stack, limit) == expected
+        assert nearest(index, x, y, len(positions), stack, failures, limit) == expected
 
 
 @pytest.mark.parametrize("kind", [GRID, KD_TREE, BRUTE_FORCE])
 def test_no_node_is_found_where_all_have_failed_too_often(kind: int) -> None:
-    index, stack = index_of(kind, np.array([[2.0, 2.0], [7.0, 7.0]]), np.array([50, 50]))
-    assert nearest(index, 6.0, 6.0, 2, stack, 10.0) == -1
-    assert nearest(index, 6.0, 6.0, 2, stack, None) == 1
+    index, stack = index_of(kind, np.array([[2.0, 2.0], [7.0, 7.0]]))
+    assert nearest(index, 6.0, 6.0, 2, stack, np.array([50, 50], dtype=np.int32), 10.0) == -1
+    assert nearest(index, 6.0, 6.0, 2, stack, None, 0.0) == 1
 
 
 @pytest.mark.parametrize("failures", [0, 1, 6, 30])
@@ -107,13 +107,13 @@ def test_every_failed_extension_is_counted_at_a_place(blind_alley: Scenario) -> 
     tree = search._tree
     is_place = tree.places[: search.nodes] == np.arange(search.nodes)
     failed = search.samples - (search.nodes - 1)
-    assert tree.failures[: search.nodes][is_place].sum() == failed
+    assert search.failures[: search.nodes][is_place].sum() == failed
     assert not is_place.all()
 
 
 def test_plain_searches_count_no_failures(blind_alley: Scenario) -> None:
     search = search_in(blind_alley, 1, ClearanceMap(blind_alley.world, blind_alley.robot.footprint), robust=False)
-    assert search._tree.failures.size == 0
+    assert search.failures.size == 0
 
 
 def test_what_the_clearance_map_holds_changes_nothing(scenarios: Path) -> None:

@@ -34,7 +34,7 @@ COUNTERS = 5
 
 
 class TreeArrays(NamedTuple):
-    """All that is stored of a tree: 92 bytes a node; 24 more in closed loop (references), 4 if robust (failures)."""
+    """All that is stored of a tree: 92 bytes a node (and 24 more for the references of the closed loop)."""
 
     states: NDArray[np.float64]
     """(x, y, theta, v, omega), shape (n, 5)."""
@@ -56,8 +56,6 @@ class TreeArrays(NamedTuple):
     """Next node at exactly the same position, -1 at the end, shape (n,)."""
     places: NDArray[np.int32]
     """The indexed node at the same position: the head of the chain of twins, shape (n,)."""
-    failures: NDArray[np.int32]
-    """Robust: failed extensions from each place, kept at its indexed node, shape (n,); else of shape (0,)."""
 
 
 @njit(cache=True)
@@ -71,8 +69,6 @@ def add_node(tree: TreeArrays, index: Index, node: int, parent: int) -> None:
     tree.siblings[node] = -1
     tree.twins[node] = -1
     tree.places[node] = node
-    if len(tree.failures) > 0:
-        tree.failures[node] = 0
     if parent >= 0:
         tree.siblings[node] = tree.first_child[parent]
         tree.first_child[parent] = node
@@ -81,8 +77,6 @@ def add_node(tree: TreeArrays, index: Index, node: int, parent: int) -> None:
             tree.places[node] = place
             tree.twins[node] = tree.twins[place]
             tree.twins[place] = node
-            if len(tree.failures) > 0:
-                tree.failures[node] = NOT_INDEXED
             return
     insert(index, node)
 
@@ -160,7 +154,7 @@ def grow(
     """Draw samples and extend the tree until something is wanted.
 
     Args:
-        states: this and the arrays up to ``failures``: see :class:`TreeArrays`.
+        states: this and the arrays up to ``places``: see :class:`TreeArrays`.
         commands: see above.
         references: see above.
         links: see above.
@@ -170,7 +164,8 @@ def grow(
         siblings: see above.
         twins: see above.
         places: see above.
-        failures: see above; with room for them, the tree grows robustly.
+        failures: failed extensions from each place, kept at its indexed node, shape (n,): the tree grows robustly; of
+            shape (0,) where it does not.
         heads: this and the next: see :class:`cbrrt_ompl.compiled.nearest.Index`.
         occupied: see above.
         stack: room for the k-d tree's search.
@@ -192,12 +187,10 @@ def grow(
         `REACHED` (the last node is in the goal), `WANT_ANSWER`, `WANT_ROOM`, `WANT_DRAWS` or `PAUSED`. After a question
         the same extension is repeated.
     """
-    tree = TreeArrays(
-        states, commands, references, links, parents, steps, first_child, siblings, twins, places, failures
-    )
+    tree = TreeArrays(states, commands, references, links, parents, steps, first_child, siblings, twins, places)
     model = unpack_model(packed_model)
     view = unpack_view(children, clearances, frame)
-    index = Index(kind, states, links, heads, occupied, view.x_min, view.y_min, cell, failures)
+    index = Index(kind, states, links, heads, occupied, view.x_min, view.y_min, cell)
     is_robust = len(failures) > 0
     width, height = view.x_max - view.x_min, view.y_max - view.y_min
     while counters[SAMPLES] < last_sample:
@@ -210,9 +203,9 @@ def grow(
         if draw[0] < goal_bias:
             x, y = model.goal.x, model.goal.y
         if is_robust:  # the root where all are passed over
-            place = max(nearest(index, x, y, counters[NODES], stack, bearable_failures(draw[4])), 0)
+            place = max(nearest(index, x, y, counters[NODES], stack, failures, bearable_failures(draw[4])), 0)
         else:
-            place = nearest(index, x, y, counters[NODES], stack, None)
+            place = nearest(index, x, y, counters[NODES], stack, None, 0.0)
         parent = one_of_twins(tree, place, draw[3])
         origin = (
             states[parent, 0],
@@ -243,6 +236,8 @@ def grow(
                 references[node, 0], references[node, 1], references[node, 2] = extension.control
             steps[node] = extension.steps
             add_node(tree, index, node, parent)
+            if is_robust:
+                failures[node] = 0 if places[node] == node else NOT_INDEXED
             counters[NODES] += 1
             if in_goal(model.goal, x, y, theta, v, omega):
                 return REACHED

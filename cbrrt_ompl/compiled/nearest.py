@@ -41,8 +41,6 @@ class Index(NamedTuple):
     y_min: float
     cell: float
     """Side of a cell [m]."""
-    failures: NDArray[np.int32]
-    """Failed extensions from each node, shape (n,); of shape (0,) where no node is ever passed over."""
 
 
 @njit(cache=True)
@@ -87,13 +85,21 @@ def _insert_into_kd_tree(index: Index, node: int) -> None:
 
 
 @njit(cache=True)
-def is_passed_over(index: Index, node: int, limit: float | None) -> bool:
-    """Whether the failures of a node are above a limit, if there is one; None costs nothing once compiled."""
-    return False if limit is None else index.failures[node] > limit
+def is_passed_over(node: int, failures: NDArray[np.int32] | None, limit: float) -> bool:
+    """Whether the failures of a node are above a limit; where none are counted, this costs nothing once compiled."""
+    return False if failures is None else failures[node] > limit
 
 
 @njit(cache=True)
-def nearest(index: Index, x: float, y: float, count: int, stack: NDArray[np.float64], limit: float | None) -> int:
+def nearest(
+    index: Index,
+    x: float,
+    y: float,
+    count: int,
+    stack: NDArray[np.float64],
+    failures: NDArray[np.int32] | None,
+    limit: float,
+) -> int:
     """The indexed node nearest to a position.
 
     Args:
@@ -102,26 +108,27 @@ def nearest(index: Index, x: float, y: float, count: int, stack: NDArray[np.floa
         y: position [m].
         count: nodes in the tree, for brute force.
         stack: room for the k-d tree's search, more rows than the tree is deep, shape (m, 3).
-        limit: nodes with more failures are passed over; None for none.
+        failures: failed extensions from each node, shape (n,); None passes no node over.
+        limit: nodes with more failures are passed over.
 
     Returns:
         Its number, -1 where all are passed over.
     """
     if index.kind == GRID:
-        return _nearest_in_grid(index, x, y, limit)
+        return _nearest_in_grid(index, x, y, failures, limit)
     if index.kind == KD_TREE:
-        return _nearest_in_kd_tree(index, x, y, stack, limit)
+        return _nearest_in_kd_tree(index, x, y, stack, failures, limit)
     best, node = math.inf, -1
     for i in range(count):
         dx, dy = index.states[i, 0] - x, index.states[i, 1] - y
         squared = dx * dx + dy * dy
-        if squared < best and not is_passed_over(index, i, limit):
+        if squared < best and not is_passed_over(i, failures, limit):
             best, node = squared, i
     return node
 
 
 @njit(cache=True)
-def _nearest_in_grid(index: Index, x: float, y: float, limit: float | None) -> int:
+def _nearest_in_grid(index: Index, x: float, y: float, failures: NDArray[np.int32] | None, limit: float) -> int:
     """Search the cells in square rings around the position, as far as they hold nodes at all."""
     column, row = cell_of(index, x, y)
     left, right, low, high = index.occupied[0], index.occupied[1], index.occupied[2], index.occupied[3]
@@ -145,7 +152,7 @@ def _nearest_in_grid(index: Index, x: float, y: float, limit: float | None) -> i
                 while candidate >= 0:
                     dx, dy = index.states[candidate, 0] - x, index.states[candidate, 1] - y
                     squared = dx * dx + dy * dy
-                    if squared < best and not is_passed_over(index, candidate, limit):
+                    if squared < best and not is_passed_over(candidate, failures, limit):
                         best, node = squared, candidate
                     candidate = index.links[candidate, 0]
                 c += 1 if is_whole or c == column + ring else max(column + ring - c, 1)
@@ -154,7 +161,9 @@ def _nearest_in_grid(index: Index, x: float, y: float, limit: float | None) -> i
 
 
 @njit(cache=True)
-def _nearest_in_kd_tree(index: Index, x: float, y: float, stack: NDArray[np.float64], limit: float | None) -> int:
+def _nearest_in_kd_tree(
+    index: Index, x: float, y: float, stack: NDArray[np.float64], failures: NDArray[np.int32] | None, limit: float
+) -> int:
     """Search depth first, the nearer side first, leaving out what lies beyond the best so far."""
     best, node = math.inf, -1
     stack[0, 0], stack[0, 1], stack[0, 2] = 0.0, 0.0, 0.0  # node, axis, squared distance of its half plane
@@ -167,7 +176,7 @@ def _nearest_in_kd_tree(index: Index, x: float, y: float, stack: NDArray[np.floa
         while i >= 0:
             dx, dy = index.states[i, 0] - x, index.states[i, 1] - y
             squared = dx * dx + dy * dy
-            if squared < best and not is_passed_over(index, i, limit):
+            if squared < best and not is_passed_over(i, failures, limit):
                 best, node = squared, i
             offset = dx if axis == 0 else dy
             near, far = (0, 1) if offset > 0.0 else (1, 0)

@@ -51,6 +51,7 @@ class Search:
 
     Attributes:
         counters: nodes, samples and more, see :mod:`cbrrt_ompl.compiled.growth`.
+        failures: robust: failed extensions from each place, see :mod:`cbrrt_ompl.compiled.growth`; 4 bytes a node.
         has_reached_goal: whether the last node is in the goal region.
     """
 
@@ -81,12 +82,12 @@ class Search:
         self._goal_bias = goal_bias
         self._kind = KINDS[neighbours]
         self._is_closed_loop = int(model[0]) == CLOSED_LOOP
-        self._is_robust = robust
         self._draws = np.empty((0, ROBUST_DRAWS if robust else DRAWS))
         self._question = np.empty(3)
         self.counters = np.zeros(COUNTERS, dtype=np.int64)
         self.has_reached_goal = False
-        self._tree = _tree_arrays(FIRST_CAPACITY, self._is_closed_loop, robust)
+        self._tree = _tree_arrays(FIRST_CAPACITY, self._is_closed_loop)
+        self.failures = np.zeros(FIRST_CAPACITY if robust else 0, dtype=np.int32)
         self._make_index(FIRST_CAPACITY)
         for node, start in enumerate(starts):
             self._tree.states[node] = start
@@ -118,6 +119,7 @@ class Search:
         while True:
             status = grow(
                 *t,
+                self.failures,
                 self._index.heads,
                 self._index.occupied,
                 self._stack,
@@ -155,10 +157,11 @@ class Search:
     def _make_room(self) -> None:
         """Double the arrays and enter the nodes into a finer index."""
         count, capacity = int(self.counters[NODES]), 2 * len(self._tree.states)
-        larger = _tree_arrays(capacity, self._is_closed_loop, self._is_robust)
+        larger = _tree_arrays(capacity, self._is_closed_loop)
         for name in TreeArrays._fields:
             old = getattr(self._tree, name)
             getattr(larger, name)[: len(old)] = old
+        self.failures = np.concatenate([self.failures, np.zeros_like(self.failures)])
         depth = int(self._index.occupied[0])
         self._tree = larger
         self._make_index(capacity, depth)
@@ -175,7 +178,7 @@ class Search:
         limits = [2**31, -1, 2**31, -1, 0] if self._kind == GRID else [0, 0, 0, 0, 0]
         occupied = np.array(limits, dtype=np.int64)
         t = self._tree
-        self._index = Index(self._kind, t.states, t.links, heads, occupied, x0, y0, cell, t.failures)
+        self._index = Index(self._kind, t.states, t.links, heads, occupied, x0, y0, cell)
         self._stack = np.empty((2 * depth + 64 if self._kind == KD_TREE else 0, 3))
 
     @property
@@ -212,7 +215,7 @@ class Search:
         return tree_from_controls(*self.edges(), self.model)
 
 
-def _tree_arrays(capacity: int, is_closed_loop: bool, is_robust: bool) -> TreeArrays:
+def _tree_arrays(capacity: int, is_closed_loop: bool) -> TreeArrays:
     """Arrays for some nodes; their contents are undefined."""
     return TreeArrays(
         states=np.empty((capacity, 5)),
@@ -225,5 +228,4 @@ def _tree_arrays(capacity: int, is_closed_loop: bool, is_robust: bool) -> TreeAr
         siblings=np.empty(capacity, dtype=np.int32),
         twins=np.empty(capacity, dtype=np.int32),
         places=np.empty(capacity, dtype=np.int32),
-        failures=np.empty(capacity if is_robust else 0, dtype=np.int32),
     )
