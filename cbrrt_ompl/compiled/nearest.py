@@ -97,8 +97,8 @@ def nearest(
     y: float,
     count: int,
     stack: NDArray[np.float64],
-    failures: NDArray[np.int32] | None,
-    limit: float,
+    failures: NDArray[np.int32] | None = None,
+    limit: float = 0.0,
 ) -> int:
     """The indexed node nearest to a position.
 
