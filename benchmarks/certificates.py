@@ -35,7 +35,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     print(
-        f"{'world':<29}{'footprint':<11}{'states':<9}{'number':>10}{'differ':>8}{'collide':>9}{'by map':>9}"
+        f"{'world':<29}{'footprint':<19}{'states':<9}{'number':>10}{'differ':>8}{'collide':>9}{'by map':>9}"
         f"{'cells':>9}{'by FCL':>9}{'built in':>10}"
     )
     total = differing = 0
@@ -56,7 +56,7 @@ def main() -> int:
                 found = compare(clearance_map, collides, poses, arguments.states)
                 total, differing = total + found.states, differing + found.disagreements
                 print(
-                    f"{name:<29}{kind:<11}{where:<9}{found.states:>10,}{found.disagreements:>8}"
+                    f"{name:<29}{kind:<19}{where:<9}{found.states:>10,}{found.disagreements:>8}"
                     f"{found.in_collision / found.states:>9.1%}{found.certified / found.states:>9.1%}"
                     f"{clearance_map.cells:>9,}{clearance_map.exact_queries:>9,}{elapsed:>8.3f} s",
                     flush=True,

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from cbrrt_ompl.errors import CbrrtError, InputError
-    from cbrrt_ompl.obstacles import Bounds, Box, Disc, Polygon
+    from cbrrt_ompl.maps import OccupancyMap, load_map, save_map
+    from cbrrt_ompl.obstacles import Bounds, Box, Disc, OrientedBox, Polygon
     from cbrrt_ompl.ompl_plugin.setup import make_setup
     from cbrrt_ompl.planning import PlanResult, plan
     from cbrrt_ompl.robot import Footprint, Gains, Limits, Robot
@@ -32,6 +33,8 @@ __all__ = [
     "Goal",
     "InputError",
     "Limits",
+    "OccupancyMap",
+    "OrientedBox",
     "PlanResult",
     "PlanningSettings",
     "Polygon",
@@ -41,16 +44,19 @@ __all__ = [
     "Trajectory",
     "World",
     "__version__",
+    "load_map",
     "load_scenario",
     "make_setup",
     "plan",
+    "save_map",
     "save_scenario",
     "verify",
 ]
 
 _MODULES = {
     "errors": ("CbrrtError", "InputError"),
-    "obstacles": ("Bounds", "Box", "Disc", "Polygon"),
+    "maps": ("OccupancyMap", "load_map", "save_map"),
+    "obstacles": ("Bounds", "Box", "Disc", "OrientedBox", "Polygon"),
     "ompl_plugin.setup": ("make_setup",),
     "planning": ("PlanResult", "plan"),
     "robot": ("Footprint", "Gains", "Limits", "Robot"),

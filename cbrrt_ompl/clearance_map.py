@@ -35,6 +35,10 @@ MAX_CELLS = 2_000_000
 """Cells that a map holds at most: 56 MB."""
 
 
+MAX_MARGINS = 100_000
+"""Answers about single poses that a map keeps at most: 20 MB."""
+
+
 class MapView(NamedTuple):
     """The map as the kernels see it."""
 
@@ -154,10 +158,11 @@ class ClearanceMap:
             inner = -math.inf  # the origin is beside the footprint, and may well be inside an obstacle
         outer = footprint.circumscribed_radius + MITRE_LIMIT * CONTACT_TOLERANCE
         self.frame = np.array([*bounds.min, *bounds.max, size, inner, outer, footprint.is_round], dtype=float)
-        self.answers = np.empty((64, 4))
+        self.answers: NDArray[np.float64] = np.empty((64, 4))
+        self._margins: dict[tuple[float, float, float], float] = {}
         self._cells = 1 if enabled else 0
-        self.children = np.zeros(self._cells, dtype=np.int32)
-        self.clearances = np.zeros((self._cells, 3))
+        self.children: NDArray[np.int32] = np.zeros(self._cells, dtype=np.int32)
+        self.clearances: NDArray[np.float64] = np.zeros((self._cells, 3))
         if enabled:
             self._ask_clearance(0, bounds.min[0] + 0.5 * size, bounds.min[1] + 0.5 * size)
 
@@ -213,7 +218,13 @@ class ClearanceMap:
             certificate = certify_packed(self.children, self.clearances, self.frame, x, y)
             if certificate != UNDECIDED:
                 return max(certificate, 0.0)
-        return self.checker.margin(x, y, theta)
+            return self.checker.margin(x, y, theta)
+        pose = (x, y, theta)  # nodes that are stuck ask the same again and again
+        if pose not in self._margins:
+            if len(self._margins) == MAX_MARGINS:
+                self._margins.clear()
+            self._margins[pose] = self.checker.margin(x, y, theta)
+        return self._margins[pose]
 
     def _ask_clearance(self, cell: int, x: float, y: float) -> None:
         """Let FCL measure the clearance of a point in a cell, and keep it."""
@@ -225,13 +236,20 @@ class ClearanceMap:
         while self._cells + 4 <= MAX_CELLS and self.enabled:
             view = self.view
             cell, x_centre, y_centre, size = find_leaf(view, x, y)
-            if size < self._smallest:
+            if size < self._smallest or self._is_hopeless(cell, x, y):
                 break
             self._split(cell, x_centre, y_centre, 0.25 * size)
             has_grown = True
             if certify_packed(self.children, self.clearances, self.frame, x, y) != UNDECIDED:
                 break
         return has_grown
+
+    def _is_hopeless(self, cell: int, x: float, y: float) -> bool:
+        """Whether a position is certainly between the two radii of the footprint, where no cell can decide it."""
+        x_asked, y_asked, clearance = self.clearances[cell].tolist()
+        distance = math.hypot(x - x_asked, y - y_asked)
+        inner, outer = self.frame[5:7].tolist()
+        return bool(inner <= clearance - distance and clearance + distance <= outer)
 
     def _split(self, cell: int, x: float, y: float, offset: float) -> None:
         """Give a leaf its four children, whose centres FCL measures."""

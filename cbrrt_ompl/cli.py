@@ -11,6 +11,7 @@ import json
 import math
 import os
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -121,6 +122,7 @@ def _plan(arguments: argparse.Namespace) -> int:
     from cbrrt_ompl.scenario import load_scenario
 
     scenario = load_scenario(arguments.scenario)
+    _warm_up(arguments.planner)
     with _progress(scenario.planning.max_samples, arguments.planner) as progress:
         result = plan(scenario, arguments.planner, arguments.seed, arguments.time_limit, progress=progress)
     written = None
@@ -138,6 +140,20 @@ def _plan(arguments: argparse.Namespace) -> int:
         if arguments.trajectory is not None and written is None:
             print(f"no trajectory, {arguments.trajectory} not written")
     return DONE if result.solved else FAILED
+
+
+def _warm_up(planner: str) -> None:
+    """Load the kernels, and say so where they must be compiled first."""
+    from cbrrt_ompl.warm_up import warm_up
+
+    message = "cbrrt: compiling the planners, once after installation ..."
+    timer = threading.Timer(1.0, print, [message], {"file": sys.stderr, "flush": True})
+    timer.daemon = True
+    timer.start()
+    try:
+        warm_up(needs_ompl=not planner.endswith("-compiled"))
+    finally:
+        timer.cancel()
 
 
 def _verify(arguments: argparse.Namespace) -> int:

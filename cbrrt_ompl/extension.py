@@ -16,7 +16,15 @@ from numpy.typing import NDArray
 from cbrrt_ompl.clearance_map import COLLISION, UNDECIDED, MapView, certify
 from cbrrt_ompl.control_laws import reference_pose, steering_rate, tracking_command
 from cbrrt_ompl.errors import Problem, SettingsError
-from cbrrt_ompl.kinematics import arc_length, dynamic_step, kinematic_step, unicycle_step, wrap_angle
+from cbrrt_ompl.kinematics import (
+    displacement,
+    dynamic_step,
+    kinematic_step,
+    middle_heading,
+    ramp,
+    unicycle_step,
+    wrap_angle,
+)
 from cbrrt_ompl.robot import Gains, Limits, Robot
 from cbrrt_ompl.settings import Goal, PlanningSettings
 
@@ -291,6 +299,52 @@ def check_step_motion(
     return EXTENDED, margin, is_certified, pose
 
 
+BLOCK = 48
+"""Steps that are integrated at once, before the first of them is checked."""
+
+SCRATCH_SHAPE = (6, BLOCK + 1)
+"""Room for a block: v, omega, theta, heading in the middle of the step, dx, dy."""
+
+
+@njit(cache=True)
+def integrate_block(
+    theta: float,
+    v: float,
+    omega: float,
+    v_command: float,
+    omega_command: float,
+    steps: int,
+    model: Model,
+    scratch: NDArray[np.float64],
+) -> None:
+    """Integrate some steps towards one command: :func:`advance`, bit for bit, with its sines on vector registers.
+
+    Args:
+        theta: heading at the start [rad].
+        v: forward velocity at the start [m/s].
+        omega: turning rate at the start [rad/s].
+        v_command: forward velocity asked for [m/s].
+        omega_command: turning rate asked for [rad/s].
+        steps: at most `BLOCK`.
+        model: how the robot moves.
+        scratch: its rows v, omega and theta are filled up to ``steps``, the others up to ``steps - 1``.
+    """
+    dt = model.dt
+    vs, omegas, thetas, middles, dxs, dys = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4], scratch[5]
+    if model.law == STEERING:
+        v, omega = v_command, omega_command
+    most, most_angular = model.limits.acceleration * dt, model.limits.angular_acceleration * dt
+    vs[0], omegas[0], thetas[0] = v, omega, theta
+    for i in range(steps):
+        v, omega_next = ramp(v, v_command, most), ramp(omega, omega_command, most_angular)
+        middles[i] = middle_heading(theta, omega, omega_next, dt)
+        theta = wrap_angle(theta + 0.5 * (omega + omega_next) * dt)
+        omega = omega_next
+        vs[i + 1], omegas[i + 1], thetas[i + 1] = v, omega, theta
+    for i in range(steps):
+        dxs[i], dys[i] = displacement(middles[i], vs[i], omegas[i], vs[i + 1], omegas[i + 1], dt)
+
+
 @njit(cache=True)
 def roll_out(
     node: tuple[float, float, float, float, float],
@@ -299,71 +353,62 @@ def roll_out(
     view: MapView,
     answers: NDArray[np.float64],
     answered: int,
+    scratch: NDArray[np.float64],
 ) -> tuple[int, int, tuple[float, float, float, float, float], tuple[float, float, float]]:
     """Drive from a valid state under one control until the horizon, the goal or an obstacle.
 
-    The steps are those of :func:`advance`, bit for bit; once the velocities are constant, what is constant with them is
-    not computed again.
-
     Args:
         node: (x, y, theta, v, omega) at the start.
-        control: see :func:`advance`.
+        control: see :func:`advance`, whose steps these are, bit for bit.
         model: how the robot moves.
         view: the clearance map.
         answers: what FCL has said, see :func:`find_answer`.
         answered: rows of ``answers`` in use.
+        scratch: room for a block, of shape `SCRATCH_SHAPE`.
 
     Returns:
         The number of steps known to be free; `EXTENDED`, `BLOCKED` or `ASK`; the state after these steps; and the pose
         that FCL must decide.
     """
     x, y, theta, v, omega = node
-    dt = model.dt
-    goal = model.goal
+    dt, goal, steps = model.dt, model.goal, model.steps
     near_goal = goal.tolerance * goal.tolerance * (1.0 + 1e-9)
     reach = 0.0 if view.is_round else view.outer
     margin = max(certify(view, x, y), 0.0)
     is_certified = margin > 0.0
-    is_steady = False
-    along = turn = half_turn = travel = sweep = 0.0
-    for k in range(1, model.steps + 1):
-        x0, y0, theta0, v0, omega0 = x, y, theta, v, omega
-        if is_steady:
-            middle = theta + half_turn
-            if along != 0.0:
-                x, y = x + along * math.cos(middle), y + along * math.sin(middle)
-            theta = wrap_angle(theta + turn)
+    k = 0
+    while k < steps:
+        if model.law == CLOSED_LOOP:
+            v_command, omega_command = tracking_command(x, y, theta, control, model.limits, model.gains)
+            count = 1
         else:
-            x, y, theta, v, omega, v_command, omega_command = advance(
-                x, y, theta, v, omega, control, model.law, model.limits, model.gains, dt
-            )
-            if model.law == STEERING:
-                v0, omega0 = v, omega
-            travel = max(abs(v0), abs(v)) * dt
-            sweep = travel + reach * max(abs(omega0), abs(omega)) * dt
-            if model.law != CLOSED_LOOP and v0 == v == v_command and omega0 == omega == omega_command:
-                is_steady = True
-                turn = 0.5 * (omega + omega) * dt
-                half_turn = 0.125 * dt * (3.0 * omega + omega)
-                along = arc_length(0.5 * (v + v), turn, dt)
-        if margin >= (travel if is_certified else sweep):
-            margin -= travel if is_certified else sweep
-        else:
-            step = Step(x0, y0, theta0, v0, omega0, x, y, theta, v, omega, travel, sweep)
-            outcome, margin, is_certified, pose = check_step_motion(
-                step, margin, is_certified, view, answers, answered, dt
-            )
-            if outcome != EXTENDED:
-                before = (x0, y0, theta0, node[3] if k == 1 else v0, node[4] if k == 1 else omega0)
-                if outcome == ASK and not model.keep_cut:
-                    rest = model.steps + 1 - k
-                    if is_doomed(x0, y0, theta0, before[3], before[4], rest, control, model, view):
-                        outcome = BLOCKED
-                return k - 1, outcome, before, pose
-        dx, dy = x - goal.x, y - goal.y
-        if dx * dx + dy * dy < near_goal and in_goal(goal, x, y, theta, v, omega):
-            return k, EXTENDED, (x, y, theta, v, omega), (x, y, theta)
-    return model.steps, EXTENDED, (x, y, theta, v, omega), (x, y, theta)
+            v_command, omega_command = control[0], control[1]
+            count = min(BLOCK, steps - k)
+        integrate_block(theta, v, omega, v_command, omega_command, count, model, scratch)
+        for i in range(count):
+            v0, omega0, v1, omega1 = scratch[0, i], scratch[1, i], scratch[0, i + 1], scratch[1, i + 1]
+            x1, y1, theta1 = x + scratch[4, i], y + scratch[5, i], scratch[2, i + 1]
+            travel = max(abs(v0), abs(v1)) * dt
+            sweep = travel + reach * max(abs(omega0), abs(omega1)) * dt
+            used = travel if is_certified else sweep
+            if margin >= used:
+                margin -= used
+            else:
+                step = Step(x, y, theta, v0, omega0, x1, y1, theta1, v1, omega1, travel, sweep)
+                outcome, margin, is_certified, pose = check_step_motion(
+                    step, margin, is_certified, view, answers, answered, dt
+                )
+                if outcome != EXTENDED:
+                    if outcome == ASK and not model.keep_cut:
+                        if is_doomed(x, y, theta, v, omega, steps - k, control, model, view):
+                            outcome = BLOCKED
+                    return k, outcome, (x, y, theta, v, omega), pose
+            x, y, theta, v, omega = x1, y1, theta1, v1, omega1
+            k += 1
+            dx, dy = x - goal.x, y - goal.y
+            if dx * dx + dy * dy < near_goal and in_goal(goal, x, y, theta, v, omega):
+                return k, EXTENDED, (x, y, theta, v, omega), (x, y, theta)
+    return steps, EXTENDED, (x, y, theta, v, omega), (x, y, theta)
 
 
 @njit(cache=True)
@@ -447,6 +492,7 @@ def extend(
     view: MapView,
     answers: NDArray[np.float64],
     answered: int,
+    scratch: NDArray[np.float64],
 ) -> Extension:
     """EXTEND_TRAJECTORY of the paper: from a node towards a sample.
 
@@ -464,6 +510,7 @@ def extend(
         view: the clearance map.
         answers: what FCL has said in this extension, see :func:`find_answer`.
         answered: rows of ``answers`` in use.
+        scratch: room for a block, of shape `SCRATCH_SHAPE`.
     """
     reference = reference_pose(node[0], node[1], node[2], x_sample, y_sample, model.look_ahead)
     best = Extension(REFUSED, 0, node, (0.0, 0.0), (0.0, 0.0, 0.0))
@@ -472,7 +519,7 @@ def extend(
         v, omega, control = candidate(c, node, reference, model)
         if is_refused(first, following, commands, v, omega, model.equal_control_tolerance):
             continue
-        steps, outcome, state, pose = roll_out(node, control, model, view, answers, answered)
+        steps, outcome, state, pose = roll_out(node, control, model, view, answers, answered, scratch)
         if outcome == ASK:
             return Extension(ASK, 0, node, (v, omega), pose)
         if steps == 0 or (outcome == BLOCKED and not model.keep_cut):

@@ -18,6 +18,7 @@ from cbrrt_ompl.replay import trajectory_from_controls
 from cbrrt_ompl.scenario import Scenario
 from cbrrt_ompl.trajectory import Trajectory
 from cbrrt_ompl.tree import Tree
+from cbrrt_ompl.warm_up import warm_up
 
 PLANNERS: dict[str, str] = {
     "cb-rrt": "CB-RRT of the paper: the Kanayama law in OMPL's control::RRT",
@@ -105,6 +106,7 @@ def plan(
         raise UnknownPlannerError(planner, list(PLANNERS))
     _check_arguments(seed, time_limit)
     check_step(scenario.robot, scenario.planning)
+    warm_up(needs_ompl=not planner.endswith("-compiled"))
     watch = _Watch(time_limit, progress)
     if not scenario.goal.violations(scenario.start):
         return _already_there(scenario, planner, seed)

@@ -21,3 +21,11 @@ def repository() -> Path:
 def scenarios(repository: Path) -> Path:
     """The folder of scenario files."""
     return repository / "scenarios"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _compiled_kernels() -> None:
+    """Compile once, so that no test waits for it or meets the message about it."""
+    from cbrrt_ompl.warm_up import warm_up
+
+    warm_up(needs_ompl=True)

@@ -150,6 +150,7 @@ def grow(
     counters: NDArray[np.int64],
     last_sample: int,
     question: NDArray[np.float64],
+    scratch: NDArray[np.float64],
 ) -> int:
     """Draw samples and extend the tree until something is wanted.
 
@@ -182,6 +183,7 @@ def grow(
         counters: see `NODES`; carried from call to call, shape (COUNTERS,).
         last_sample: number of samples to pause at.
         question: takes the pose that FCL must decide, shape (3,).
+        scratch: room for a block of steps, see :mod:`cbrrt_ompl.extension`.
 
     Returns:
         `REACHED` (the last node is in the goal), `WANT_ANSWER`, `WANT_ROOM`, `WANT_DRAWS` or `PAUSED`. After a question
@@ -214,7 +216,9 @@ def grow(
             states[parent, 3],
             states[parent, 4],
         )
-        extension = extend(origin, x, y, first_child[parent], siblings, commands, model, view, answers, answered)
+        extension = extend(
+            origin, x, y, first_child[parent], siblings, commands, model, view, answers, answered, scratch
+        )
         if extension.outcome == ASK:
             question[0], question[1], question[2] = extension.control
             return WANT_ANSWER

@@ -113,10 +113,11 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
         path = oc.PathControl(self.getSpaceInformation())
         nodes = self.search.path_to(self.search.nodes - 1)
         states, _, controls, steps = self.search.edges()
-        path.append(self._state(states[nodes[0]])())
+        state = self._state(states[nodes[0]])  # named, for OMPL sees only what it points to
+        path.append(state())
         for node in nodes[1:]:
-            control = self._control(controls[node])
-            path.append(self._state(states[node])(), control, float(steps[node] * self._model[1]))
+            state, control = self._state(states[node]), self._control(controls[node])
+            path.append(state(), control, float(steps[node] * self._model[1]))
             self.getSpaceInformation().getControlSpace().freeControl(control)
         return path
 

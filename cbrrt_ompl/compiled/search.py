@@ -27,7 +27,7 @@ from cbrrt_ompl.compiled.growth import (
     rebuild_index,
 )
 from cbrrt_ompl.compiled.nearest import GRID, KD_TREE, KINDS, Index
-from cbrrt_ompl.extension import CLOSED_LOOP
+from cbrrt_ompl.extension import CLOSED_LOOP, SCRATCH_SHAPE
 from cbrrt_ompl.replay import trajectory_from_controls, tree_from_controls
 from cbrrt_ompl.settings import State
 from cbrrt_ompl.trajectory import Trajectory
@@ -82,8 +82,9 @@ class Search:
         self._goal_bias = goal_bias
         self._kind = KINDS[neighbours]
         self._is_closed_loop = int(model[0]) == CLOSED_LOOP
-        self._draws = np.empty((0, ROBUST_DRAWS if robust else DRAWS))
+        self._draws: NDArray[np.float64] = np.empty((0, ROBUST_DRAWS if robust else DRAWS))
         self._question = np.empty(3)
+        self._scratch = np.empty(SCRATCH_SHAPE)
         self.counters = np.zeros(COUNTERS, dtype=np.int64)
         self.has_reached_goal = False
         self._tree = _tree_arrays(FIRST_CAPACITY, self._is_closed_loop)
@@ -115,7 +116,7 @@ class Search:
     def _grow(self, last_sample: int, deadline: float) -> None:
         """Run the loop up to a number of samples, or until the deadline passes while FCL is asked."""
         t, m = self._tree, self._map
-        answered, asked_at = 0, -1
+        answered, asked_at, first_sample = 0, -1, self.samples
         while True:
             status = grow(
                 *t,
@@ -136,13 +137,14 @@ class Search:
                 self.counters,
                 last_sample,
                 self._question,
+                self._scratch,
             )
             if status == WANT_ANSWER:
-                now_at = self.samples
-                answered = m.answer(answered if now_at == asked_at else 0, *self._question.tolist())
-                asked_at = now_at
-                if time.perf_counter() > deadline and not answered:
-                    return
+                if self.samples != asked_at:  # a new extension
+                    if self.samples > first_sample and time.perf_counter() > deadline:
+                        return
+                    answered, asked_at = 0, self.samples
+                answered = m.answer(answered, *self._question.tolist())
             elif status == WANT_DRAWS:
                 rows, columns = self._draws.shape
                 self._draws = self._rng.random((min(max(2 * rows, 256), DRAWS_AT_ONCE), columns))

@@ -14,6 +14,7 @@ from cbrrt_ompl.extension import (
     CLOSED_LOOP,
     EXTENDED,
     REFUSED,
+    SCRATCH_SHAPE,
     extend,
     unpack_model,
 )
@@ -53,9 +54,10 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         unpacked = unpack_model.py_func(model)
         self._control_dimension = 3 if unpacked.law == CLOSED_LOOP else 2
         self._outcome = np.empty(OUTCOME_SIZE)
+        self._scratch = np.empty(SCRATCH_SHAPE)
         self._first_child: dict[bytes, int] = {}
-        self._following = np.empty(64, dtype=np.int32)
-        self._commands = np.empty((64, 2))
+        self._following: NDArray[np.int32] = np.empty(64, dtype=np.int32)
+        self._commands: NDArray[np.float64] = np.empty((64, 2))
         self.children = 0
 
     def sampleTo(self, control: Any, *states: Any) -> int:  # noqa: N802  # OMPL's name
@@ -94,6 +96,7 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
             m.answers,
             answered,
             self._outcome,
+            self._scratch,
         )
 
     def _ask_and_extend(self, first: int) -> int:
@@ -143,6 +146,7 @@ def extend_packed(
     answers: NDArray[np.float64],
     answered: int,
     outcome: NDArray[np.float64],
+    scratch: NDArray[np.float64],
 ) -> int:
     """:func:`cbrrt_ompl.extension.extend` for a caller in Python: flat arrays in, outcome and last state out."""
     extension = extend(
@@ -156,6 +160,7 @@ def extend_packed(
         unpack_view(children, clearances, frame),
         answers,
         answered,
+        scratch,
     )
     outcome[0] = extension.steps
     outcome[1], outcome[2] = extension.command
@@ -163,3 +168,22 @@ def extend_packed(
     if extension.outcome == EXTENDED:
         sample[0], sample[1], sample[2], sample[3], sample[4] = extension.state
     return extension.outcome
+
+
+def warm_up_sampler(model: NDArray[np.float64], clearance_map: ClearanceMap) -> None:
+    """Load or compile the samplers' kernel."""
+    extend_packed(
+        np.array([0.5, 0.5, 0.0, 0.0, 0.0]),
+        np.array([0.6, 0.6, 0.0, 0.0, 0.0]),
+        -1,
+        np.empty(1, dtype=np.int32),
+        np.empty((1, 2)),
+        model,
+        clearance_map.children,
+        clearance_map.clearances,
+        clearance_map.frame,
+        clearance_map.answers,
+        0,
+        np.empty(OUTCOME_SIZE),
+        np.empty(SCRATCH_SHAPE),
+    )

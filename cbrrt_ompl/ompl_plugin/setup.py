@@ -32,6 +32,9 @@ SAMPLERS: dict[str, type[ExtensionSampler]] = {
 """Planners of the paper: control::RRT with a directed sampler of ours."""
 
 
+COMPILED_PLANNERS = tuple(f"{name}-compiled" for name in SAMPLERS)
+"""The same as one compiled loop, which OMPL runs as a planner of its own kind."""
+
 OMPL_PLANNERS: dict[str, Callable[[Any, Scenario], Any]] = {
     "rrt": lambda si, _: oc.RRT(si),
     "kpiece1": lambda si, _: oc.KPIECE1(si),
@@ -64,8 +67,8 @@ def make_setup(scenario: Scenario, planner: str = "cb-rrt") -> Any:
 
     Args:
         scenario: world, robot, start, goal and settings.
-        planner: `cb-rrt`, `s-rrt`, or a planner of OMPL: `rrt`, `kpiece1`, `est`, `sst`, `pdst`, `syclop-rrt`,
-            `syclop-est`.
+        planner: `cb-rrt`, `s-rrt`, `cb-rrt-compiled`, `s-rrt-compiled`, or a planner of OMPL: `rrt`, `kpiece1`, `est`,
+            `sst`, `pdst`, `syclop-rrt`, `syclop-est`.
 
     Returns:
         The set-up with state space, validity checker, propagator, start, goal and planner. Its limits are OMPL's: pass
@@ -88,8 +91,9 @@ def make_equipped_setup(
         planner: see :func:`make_setup`.
         clearance_map: map of the scenario's world and footprint; a new one if None.
     """
-    if planner not in SAMPLERS and planner not in OMPL_PLANNERS:
-        raise UnknownPlannerError(planner, [*SAMPLERS, *OMPL_PLANNERS])
+    known = [*SAMPLERS, *COMPILED_PLANNERS, *OMPL_PLANNERS]
+    if planner not in known:
+        raise UnknownPlannerError(planner, known)
     check_step(scenario.robot, scenario.planning)
     limits, bounds = scenario.robot.limits, scenario.world.bounds
     space = make_state_space(bounds, limits)
@@ -107,7 +111,7 @@ def make_equipped_setup(
     setup.setStartState(start)
     setup.setGoal(make_goal(si, space, scenario.goal))
     equipment = equip(si, space, scenario, planner, clearance_map)
-    setup.setPlanner(make_planner(si, scenario, planner))
+    setup.setPlanner(make_planner(si, scenario, planner, clearance_map))
     if planner == "sst":
         setup.setOptimizationObjective(first_solution_objective(si))
     return setup, equipment
@@ -139,14 +143,19 @@ def equip(si: Any, space: Any, scenario: Scenario, planner: str, clearance_map: 
     return equipment
 
 
-def make_planner(si: Any, scenario: Scenario, planner: str) -> Any:
-    """A planner of OMPL under our name; control::RRT for the paper's planners, with the scenario's goal bias.
+def make_planner(si: Any, scenario: Scenario, planner: str, clearance_map: ClearanceMap) -> Any:
+    """A planner under our name; for `cb-rrt` and `s-rrt` control::RRT, with the scenario's goal bias.
 
     Args:
         si: the equipped space information.
-        scenario: bounds (for Syclop's grid) and goal bias.
+        scenario: bounds (for Syclop's grid), goal bias, and all that the compiled planners plan for.
         planner: a known planner's name.
+        clearance_map: decides the states of the compiled planners.
     """
+    if planner in COMPILED_PLANNERS:
+        from cbrrt_ompl.compiled.planner import CompiledPlanner  # here, since it builds on this package
+
+        return CompiledPlanner(si, scenario, planner, clearance_map)
     if planner in SAMPLERS:
         made = oc.RRT(si)
         made.setGoalBias(scenario.planning.goal_bias)
