@@ -190,6 +190,7 @@ def _plan(arguments: argparse.Namespace) -> int:
 
 def _warm_up(planner: str) -> None:
     """Load the kernels, and say so where they must be compiled first."""
+    from cbrrt_ompl.extension import COMPILED_PLANNERS
     from cbrrt_ompl.warm_up import warm_up
 
     message = "cbrrt: compiling the planners, once after installation ..."
@@ -197,7 +198,7 @@ def _warm_up(planner: str) -> None:
     timer.daemon = True
     timer.start()
     try:
-        warm_up(needs_ompl=not planner.endswith("-compiled"))
+        warm_up(needs_ompl=planner not in COMPILED_PLANNERS)
     finally:
         timer.cancel()
 

@@ -107,6 +107,10 @@ def pack_model(law: int, robot: Robot, goal: Goal, planning: PlanningSettings) -
     return np.array([*head, *robot.limits, *robot.gains, *region], dtype=float)
 
 
+COMPILED_PLANNERS = ("cb-rrt-compiled", "s-rrt-compiled", "cb-rrt-robust")
+"""Planners that are one compiled loop and need no OMPL."""
+
+
 def law_of(planner: str, planning: PlanningSettings) -> int:
     """How a planner drives: `STEERING`, `CLOSED_LOOP` or `OPEN_LOOP` (as OMPL's own planners do)."""
     if planner.startswith("s-rrt"):

@@ -11,9 +11,9 @@ from functools import cached_property
 import numpy as np
 
 from cbrrt_ompl.clearance_map import clearance_map_for
-from cbrrt_ompl.compiled.search import Search
+from cbrrt_ompl.compiled.search import ROBUST, Search
 from cbrrt_ompl.errors import Problem, SettingsError, UnknownPlannerError
-from cbrrt_ompl.extension import check_step, law_of, pack_model
+from cbrrt_ompl.extension import COMPILED_PLANNERS, check_step, law_of, pack_model
 from cbrrt_ompl.replay import trajectory_from_controls
 from cbrrt_ompl.scenario import Scenario
 from cbrrt_ompl.trajectory import Trajectory
@@ -25,6 +25,7 @@ PLANNERS: dict[str, str] = {
     "s-rrt": "S-RRT, the paper's baseline: full speed, three steering rates; kinematic",
     "cb-rrt-compiled": "CB-RRT as one compiled loop: the same kernels, many times as fast",
     "s-rrt-compiled": "S-RRT as one compiled loop",
+    "cb-rrt-robust": "cb-rrt-compiled that passes over nodes extended in vain: for real maps",
     "rrt": "OMPL's control::RRT with random controls",
     "kpiece1": "OMPL's KPIECE1",
     "est": "OMPL's expansive space trees",
@@ -105,11 +106,11 @@ def plan(
         raise UnknownPlannerError(planner, list(PLANNERS))
     _check_arguments(seed, time_limit)
     check_step(scenario.robot, scenario.planning)
-    warm_up(needs_ompl=not planner.endswith("-compiled"))
+    warm_up(needs_ompl=planner not in COMPILED_PLANNERS)
     watch = _Watch(time_limit, progress)
     if not scenario.goal.violations(scenario.start):
         return _already_there(scenario, planner, seed)
-    if planner.endswith("-compiled"):
+    if planner in COMPILED_PLANNERS:
         return _plan_compiled(scenario, planner, seed, watch)
     return _plan_in_ompl(scenario, planner, seed, watch)
 
@@ -135,6 +136,7 @@ def _plan_compiled(scenario: Scenario, planner: str, seed: int | None, watch: _W
         seed,
         goal_bias=planning.goal_bias,
         neighbours=planning.nearest_neighbour,
+        robust=planner == ROBUST,
     )
     watch.start()
     search.run(watch.should_stop, planning.max_samples)

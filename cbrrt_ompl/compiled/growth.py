@@ -1,7 +1,12 @@
-"""The compiled loop: Algorithms I and II of the paper over flat arrays."""
+"""The compiled loop: Algorithms I and II of the paper over flat arrays.
+
+The robust kind departs from the paper in one line: what is extended is the nearest place that is not passed over, and
+the more extensions from a place have failed, the likelier it is passed over (docs/robust.md).
+"""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -10,13 +15,17 @@ from numpy.typing import NDArray
 
 from cbrrt_ompl.clearance_map import unpack_view
 from cbrrt_ompl.compiled.nearest import KD_TREE, Index, insert, nearest
-from cbrrt_ompl.extension import ASK, BLOCKED, CLOSED_LOOP, REFUSED, extend, in_goal, unpack_model
+from cbrrt_ompl.extension import ASK, BLOCKED, CLOSED_LOOP, EXTENDED, REFUSED, extend, in_goal, unpack_model
 
 REACHED, WANT_ANSWER, WANT_ROOM, WANT_DRAWS, PAUSED = 0, 1, 2, 3, 4
 """Why the loop returns: a node in the goal, a question to FCL, full arrays, no random numbers left, enough for now."""
 
-DRAWS = 4
-"""Random numbers of a sample: goal bias, x, y, and the choice among nodes at one position."""
+DRAWS, ROBUST_DRAWS = 4, 5
+"""Random numbers of a sample: goal bias, x, y, the choice among nodes at one position; and how many
+failures of a place it bears."""
+
+NOT_INDEXED = 2**31 - 1
+"""Robust: failures of a node that its place stands for, so that brute force finds no other nodes than the indexes."""
 
 NODES, SAMPLES, DRAWN, REFUSALS, COLLISIONS = 0, 1, 2, 3, 4
 """Counters of a search: nodes, samples, rows of draws used up, extensions refused by line 5, and cut by obstacles."""
@@ -100,6 +109,16 @@ def one_of_twins(tree: TreeArrays, place: int, draw: float) -> int:
 
 
 @njit(cache=True)
+def bearable_failures(draw: float) -> float:
+    """Most failures with which a place is not passed over: one with f failures is with the chance f / (1 + f).
+
+    Args:
+        draw: random number in [0, 1), the same for all places.
+    """
+    return 1.0 / draw - 1.0 if draw > 0.0 else math.inf
+
+
+@njit(cache=True)
 def rebuild_index(tree: TreeArrays, index: Index, count: int) -> None:
     """Enter all nodes that stand for their position into an empty index."""
     for node in range(count):
@@ -119,6 +138,7 @@ def grow(
     siblings: NDArray[np.int32],
     twins: NDArray[np.int32],
     places: NDArray[np.int32],
+    failures: NDArray[np.int32],
     heads: NDArray[np.int32],
     occupied: NDArray[np.int64],
     stack: NDArray[np.float64],
@@ -150,6 +170,8 @@ def grow(
         siblings: see above.
         twins: see above.
         places: see above.
+        failures: failed extensions from each place, kept at its indexed node, shape (n,): the tree grows robustly; of
+            shape (0,) where it does not.
         heads: this and the next: see :class:`cbrrt_ompl.compiled.nearest.Index`.
         occupied: see above.
         stack: room for the k-d tree's search.
@@ -160,7 +182,7 @@ def grow(
         children: this and the next two: the clearance map.
         clearances: see above.
         frame: see above.
-        draws: random numbers in [0, 1), a sample a row, shape (m, DRAWS).
+        draws: random numbers in [0, 1), a sample a row, shape (m, DRAWS), or (m, ROBUST_DRAWS).
         answers: what FCL has said about the present extension.
         answered: rows of ``answers`` in use.
         counters: see `NODES`; carried from call to call, shape (COUNTERS,).
@@ -176,6 +198,7 @@ def grow(
     model = unpack_model(packed_model)
     view = unpack_view(children, clearances, frame)
     index = Index(kind, states, links, heads, occupied, view.x_min, view.y_min, cell)
+    is_robust = len(failures) > 0
     width, height = view.x_max - view.x_min, view.y_max - view.y_min
     while counters[SAMPLES] < last_sample:
         if counters[NODES] == len(states) or (kind == KD_TREE and occupied[0] + 2 > len(stack)):
@@ -186,7 +209,11 @@ def grow(
         x, y = view.x_min + draw[1] * width, view.y_min + draw[2] * height
         if draw[0] < goal_bias:
             x, y = model.goal.x, model.goal.y
-        parent = one_of_twins(tree, nearest(index, x, y, counters[NODES], stack), draw[3])
+        if is_robust:  # the root where all are passed over
+            place = max(nearest(index, x, y, counters[NODES], stack, failures, bearable_failures(draw[4])), 0)
+        else:
+            place = nearest(index, x, y, counters[NODES], stack, None, 0.0)
+        parent = one_of_twins(tree, place, draw[3])
         origin = (
             states[parent, 0],
             states[parent, 1],
@@ -203,6 +230,8 @@ def grow(
         answered = 0
         counters[DRAWN] += 1
         counters[SAMPLES] += 1
+        if is_robust and extension.outcome != EXTENDED:
+            failures[place] += 1
         if extension.outcome == REFUSED:
             counters[REFUSALS] += 1
         elif extension.outcome == BLOCKED:
@@ -216,6 +245,8 @@ def grow(
                 references[node, 0], references[node, 1], references[node, 2] = extension.control
             steps[node] = extension.steps
             add_node(tree, index, node, parent)
+            if is_robust:
+                failures[node] = 0 if places[node] == node else NOT_INDEXED
             counters[NODES] += 1
             if in_goal(model.goal, x, y, theta, v, omega):
                 return REACHED

@@ -85,7 +85,21 @@ def _insert_into_kd_tree(index: Index, node: int) -> None:
 
 
 @njit(cache=True)
-def nearest(index: Index, x: float, y: float, count: int, stack: NDArray[np.float64]) -> int:
+def is_passed_over(node: int, failures: NDArray[np.int32] | None, limit: float) -> bool:
+    """Whether the failures of a node are above a limit; where none are counted, this costs nothing once compiled."""
+    return False if failures is None else failures[node] > limit
+
+
+@njit(cache=True)
+def nearest(
+    index: Index,
+    x: float,
+    y: float,
+    count: int,
+    stack: NDArray[np.float64],
+    failures: NDArray[np.int32] | None = None,
+    limit: float = 0.0,
+) -> int:
     """The indexed node nearest to a position.
 
     Args:
@@ -94,19 +108,21 @@ def nearest(index: Index, x: float, y: float, count: int, stack: NDArray[np.floa
         y: position [m].
         count: nodes in the tree, for brute force.
         stack: room for the k-d tree's search, more rows than the tree is deep, shape (m, 3).
+        failures: failed extensions from each node, shape (n,); None passes no node over.
+        limit: nodes with more failures are passed over.
 
     Returns:
-        Its number.
+        Its number, -1 where all are passed over.
     """
     if index.kind == GRID:
-        return _nearest_in_grid(index, x, y)
+        return _nearest_in_grid(index, x, y, failures, limit)
     if index.kind == KD_TREE:
-        return _nearest_in_kd_tree(index, x, y, stack)
-    best, node = math.inf, 0
+        return _nearest_in_kd_tree(index, x, y, stack, failures, limit)
+    best, node = math.inf, -1
     for i in range(count):
         dx, dy = index.states[i, 0] - x, index.states[i, 1] - y
         squared = dx * dx + dy * dy
-        if squared < best:
+        if squared < best and not is_passed_over(i, failures, limit):
             best, node = squared, i
     return node
 
@@ -122,7 +138,7 @@ def _gap(offset: float, cell: int, cells: int, size: float) -> float:
 
 
 @njit(cache=True)
-def _nearest_in_grid(index: Index, x: float, y: float) -> int:
+def _nearest_in_grid(index: Index, x: float, y: float, failures: NDArray[np.int32] | None, limit: float) -> int:
     """Search the cells in square rings around the position, as far as they hold nodes at all."""
     column, row = cell_of(index, x, y)
     rows, columns = index.heads.shape
@@ -149,7 +165,7 @@ def _nearest_in_grid(index: Index, x: float, y: float) -> int:
                 while candidate >= 0:
                     dx, dy = index.states[candidate, 0] - x, index.states[candidate, 1] - y
                     squared = dx * dx + dy * dy
-                    if squared < best:
+                    if squared < best and not is_passed_over(candidate, failures, limit):
                         best, node = squared, candidate
                     candidate = index.links[candidate, 0]
                 c += 1 if is_whole or c == column + ring else max(column + ring - c, 1)
@@ -158,9 +174,11 @@ def _nearest_in_grid(index: Index, x: float, y: float) -> int:
 
 
 @njit(cache=True)
-def _nearest_in_kd_tree(index: Index, x: float, y: float, stack: NDArray[np.float64]) -> int:
+def _nearest_in_kd_tree(
+    index: Index, x: float, y: float, stack: NDArray[np.float64], failures: NDArray[np.int32] | None, limit: float
+) -> int:
     """Search depth first, the nearer side first, leaving out what lies beyond the best so far."""
-    best, node = math.inf, 0
+    best, node = math.inf, -1
     stack[0, 0], stack[0, 1], stack[0, 2] = 0.0, 0.0, 0.0  # node, axis, squared distance of its half plane
     depth = 1
     while depth > 0:
@@ -171,7 +189,7 @@ def _nearest_in_kd_tree(index: Index, x: float, y: float, stack: NDArray[np.floa
         while i >= 0:
             dx, dy = index.states[i, 0] - x, index.states[i, 1] - y
             squared = dx * dx + dy * dy
-            if squared < best:
+            if squared < best and not is_passed_over(i, failures, limit):
                 best, node = squared, i
             offset = dx if axis == 0 else dy
             near, far = (0, 1) if offset > 0.0 else (1, 0)

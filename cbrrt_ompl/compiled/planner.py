@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cbrrt_ompl.clearance_map import ClearanceMap
-from cbrrt_ompl.compiled.search import Search
+from cbrrt_ompl.compiled.search import ROBUST, Search
 from cbrrt_ompl.extension import law_of, pack_model
 from cbrrt_ompl.ompl_plugin.binding import ob, oc
 from cbrrt_ompl.ompl_plugin.reals import StateReals
@@ -36,7 +36,7 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
         Args:
             si: the space information of the problem.
             scenario: robot, goal and settings.
-            name: `cb-rrt-compiled` or `s-rrt-compiled`.
+            name: `cb-rrt-compiled`, `cb-rrt-robust` or `s-rrt-compiled`.
             clearance_map: decides the states.
             seed: of the first tree; the next ones go on from there. None draws a fresh one.
         """
@@ -45,6 +45,7 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
         self._scenario = scenario
         self._map = clearance_map
         self._model = pack_model(law_of(name, scenario.planning), scenario.robot, scenario.goal, scenario.planning)
+        self._is_robust = name == ROBUST
         self._seed = seed
 
     def clear(self) -> None:
@@ -74,6 +75,7 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
                 self._seed,
                 goal_bias=planning.goal_bias,
                 neighbours=planning.nearest_neighbour,
+                robust=self._is_robust,
             )
         self.search.run(lambda _: bool(condition()), self._scenario.planning.max_samples)
         if not self.search.has_reached_goal:

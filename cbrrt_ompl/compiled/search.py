@@ -16,6 +16,7 @@ from cbrrt_ompl.compiled.growth import (
     DRAWS,
     NODES,
     REACHED,
+    ROBUST_DRAWS,
     SAMPLES,
     WANT_ANSWER,
     WANT_DRAWS,
@@ -41,12 +42,16 @@ PAUSE = 0.002
 FIRST_CAPACITY = 256
 """Nodes that a search has room for at first; doubled when full."""
 
+ROBUST = "cb-rrt-robust"
+"""Name of the planner whose search is robust."""
+
 
 class Search:
     """One tree, grown by the compiled loop.
 
     Attributes:
         counters: nodes, samples and more, see :mod:`cbrrt_ompl.compiled.growth`.
+        failures: robust: failed extensions from each place, see :mod:`cbrrt_ompl.compiled.growth`; 4 bytes a node.
         has_reached_goal: whether the last node is in the goal region.
     """
 
@@ -59,6 +64,7 @@ class Search:
         *,
         goal_bias: float = 0.0,
         neighbours: str = "grid",
+        robust: bool = False,
     ) -> None:
         """Plant the start states.
 
@@ -69,18 +75,20 @@ class Search:
             seed: of the search's own generator; None draws a fresh one.
             goal_bias: share of samples that are the goal.
             neighbours: `grid`, `kd-tree` or `brute-force`.
+            robust: whether places are passed over the likelier, the more extensions from there have failed.
         """
         self.model, self._map = model, clearance_map
         self._rng = np.random.default_rng(seed)
         self._goal_bias = goal_bias
         self._kind = KINDS[neighbours]
         self._is_closed_loop = int(model[0]) == CLOSED_LOOP
-        self._draws: NDArray[np.float64] = np.empty((0, DRAWS))
+        self._draws: NDArray[np.float64] = np.empty((0, ROBUST_DRAWS if robust else DRAWS))
         self._question = np.empty(3)
         self._scratch = np.empty(SCRATCH_SHAPE)
         self.counters = np.zeros(COUNTERS, dtype=np.int64)
         self.has_reached_goal = False
         self._tree = _tree_arrays(FIRST_CAPACITY, self._is_closed_loop)
+        self.failures = np.zeros(FIRST_CAPACITY if robust else 0, dtype=np.int32)
         self._make_index(FIRST_CAPACITY)
         for node, start in enumerate(starts):
             self._tree.states[node] = start
@@ -112,6 +120,7 @@ class Search:
         while True:
             status = grow(
                 *t,
+                self.failures,
                 self._index.heads,
                 self._index.occupied,
                 self._stack,
@@ -137,7 +146,8 @@ class Search:
                     answered, asked_at = 0, self.samples
                 answered = m.answer(answered, *self._question.tolist())
             elif status == WANT_DRAWS:
-                self._draws = self._rng.random((min(max(2 * len(self._draws), 256), DRAWS_AT_ONCE), DRAWS))
+                rows, columns = self._draws.shape
+                self._draws = self._rng.random((min(max(2 * rows, 256), DRAWS_AT_ONCE), columns))
                 self.counters[DRAWN] = 0
             elif status == WANT_ROOM:
                 self._make_room()
@@ -153,6 +163,7 @@ class Search:
         for name in TreeArrays._fields:
             old = getattr(self._tree, name)
             getattr(larger, name)[: len(old)] = old
+        self.failures = np.concatenate([self.failures, np.zeros_like(self.failures)])
         occupied = self._index.occupied
         self._tree = larger
         self._make_index(capacity, int(occupied[0]))
@@ -171,7 +182,8 @@ class Search:
         heads = np.full(shape, -1, dtype=np.int32)
         limits = [2**31, -1, 2**31, -1, 0] if self._kind == GRID else [0, 0, 0, 0, 0]
         occupied = np.array(limits, dtype=np.int64)
-        self._index = Index(self._kind, self._tree.states, self._tree.links, heads, occupied, x0, y0, cell)
+        t = self._tree
+        self._index = Index(self._kind, t.states, t.links, heads, occupied, x0, y0, cell)
         self._stack = np.empty((2 * depth + 64 if self._kind == KD_TREE else 0, 3))
 
     @property

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cbrrt_ompl.clearance_map import ClearanceMap
 from cbrrt_ompl.errors import UnknownPlannerError
-from cbrrt_ompl.extension import CLOSED_LOOP, check_step, law_of, pack_model
+from cbrrt_ompl.extension import CLOSED_LOOP, COMPILED_PLANNERS, check_step, law_of, pack_model
 from cbrrt_ompl.ompl_plugin.binding import ob, oc
 from cbrrt_ompl.ompl_plugin.decomposition import PositionDecomposition
 from cbrrt_ompl.ompl_plugin.goals import make_goal
@@ -32,11 +32,8 @@ SAMPLERS: dict[str, type[ExtensionSampler]] = {
 """Planners of the paper: control::RRT with a directed sampler of ours."""
 
 
-COMPILED_PLANNERS = tuple(f"{name}-compiled" for name in SAMPLERS)
-"""The same as one compiled loop, which OMPL runs as a planner of its own kind."""
-
 FREE_VOLUME_SAMPLES = 8192
-"""States by which Syclop estimates the free volume of its cells before it looks at the clock: 8 a cell, of OMPL's 98."""
+"""States by which Syclop estimates the free volume of its cells before it looks at the clock: 8 a cell, not 98."""
 
 
 def _syclop(planner: Any, si: Any, scenario: Scenario) -> Any:
@@ -78,8 +75,8 @@ def make_setup(scenario: Scenario, planner: str = "cb-rrt") -> Any:
 
     Args:
         scenario: world, robot, start, goal and settings.
-        planner: `cb-rrt`, `s-rrt`, `cb-rrt-compiled`, `s-rrt-compiled`, or a planner of OMPL: `rrt`, `kpiece1`, `est`,
-            `sst`, `pdst`, `syclop-rrt`, `syclop-est`.
+        planner: `cb-rrt`, `s-rrt`, `cb-rrt-compiled`, `s-rrt-compiled`, `cb-rrt-robust`, or a planner of OMPL: `rrt`,
+            `kpiece1`, `est`, `sst`, `pdst`, `syclop-rrt`, `syclop-est`.
 
     Returns:
         The set-up with state space, validity checker, propagator, start, goal and planner. Its limits are OMPL's: pass
