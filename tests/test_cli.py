@@ -19,7 +19,7 @@ from cbrrt_ompl.scenario import load_scenario
 from cbrrt_ompl.trajectory import Trajectory
 from cbrrt_ompl.verification import verify
 
-COMMANDS = ("plan", "verify", "show", "planners", "demo")
+COMMANDS = ("plan", "verify", "show", "planners", "demo", "bench", "report")
 
 OPEN = """
 name: open
