@@ -47,7 +47,7 @@ def test_the_example_has_ten_lines_of_code(readme: str) -> None:
 
 
 def test_the_scenario_can_be_loaded(readme: str, tmp_path: Path) -> None:
-    (text,) = blocks(readme, "yaml")
+    text, _ = blocks(readme, "yaml")
     path = tmp_path / "scenario.yaml"
     path.write_text(text, encoding="utf-8")
     scenario = load_scenario(path)
