@@ -213,7 +213,7 @@ class ClearanceMap:
     def _margin(self, x: float, y: float, theta: float) -> float:
         """FCL's margin at a pose, 0 in collision; for a round footprint the map keeps it, in place of an older one."""
         if self._is_round and self.enabled:
-            cell, _, _, _ = find_leaf(self.view, x, y)
+            cell, _, _, _ = find_leaf_packed(self.children, self.clearances, self.frame, x, y)
             self._ask_clearance(cell, x, y)
             certificate = certify_packed(self.children, self.clearances, self.frame, x, y)
             if certificate != UNDECIDED:
@@ -234,8 +234,7 @@ class ClearanceMap:
         """Split the cells at an undecided position until it is decided; False where nothing could be split."""
         has_grown = False
         while self._cells + 4 <= MAX_CELLS and self.enabled:
-            view = self.view
-            cell, x_centre, y_centre, size = find_leaf(view, x, y)
+            cell, x_centre, y_centre, size = find_leaf_packed(self.children, self.clearances, self.frame, x, y)
             if size < self._smallest or self._is_hopeless(cell, x, y):
                 break
             self._split(cell, x_centre, y_centre, 0.25 * size)
@@ -281,3 +280,11 @@ def certify_packed(
 ) -> float:
     """:func:`certify` for a caller in Python, to whom arrays cost less than a named tuple."""
     return certify(unpack_view(children, clearances, frame), x, y)
+
+
+@njit(cache=True)
+def find_leaf_packed(
+    children: NDArray[np.int32], clearances: NDArray[np.float64], frame: NDArray[np.float64], x: float, y: float
+) -> tuple[int, float, float, float]:
+    """:func:`find_leaf` for a caller in Python."""
+    return find_leaf(unpack_view(children, clearances, frame), x, y)
