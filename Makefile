@@ -12,9 +12,7 @@ help:
 demo: $(VENV)/demo.stamp
 	$(BIN)/cbrrt demo --output demo
 
-# numba's cache follows a kernel's own file alone: what other files' kernels put into it would stay old
 test: $(VENV)/test.stamp
-	find cbrrt_ompl -name '*.nb[ic]' -delete
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy

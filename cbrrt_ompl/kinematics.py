@@ -10,7 +10,10 @@ import math
 import numpy as np
 from numba import njit
 
+from cbrrt_ompl.kernel_cache import drop_stale_kernels
 from cbrrt_ompl.robot import Limits
+
+drop_stale_kernels()  # here, since every other kernel is built on this module
 
 
 @njit(cache=True)

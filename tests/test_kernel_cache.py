@@ -1,0 +1,36 @@
+"""Compiled kernels must not outlive what they were compiled from."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from cbrrt_ompl.kernel_cache import drop_stale_kernels
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    """Two modules, the second with a cached kernel that is younger than both."""
+    (tmp_path / "__pycache__").mkdir()
+    for age, name in ((300, "callee.py"), (300, "caller.py"), (200, "__pycache__/caller.kernel-1.py311.nbi")):
+        (tmp_path / name).touch()
+        os.utime(tmp_path / name, (1e9 - age, 1e9 - age))
+    return tmp_path
+
+
+def test_a_kernel_younger_than_all_modules_is_kept(package: Path) -> None:
+    drop_stale_kernels(package)
+    assert len(list(package.rglob("*.nbi"))) == 1
+
+
+def test_a_kernel_is_dropped_when_a_module_that_it_may_call_has_changed(package: Path) -> None:
+    """numba looks at caller.py alone, and would go on with callee.py as it was."""
+    os.utime(package / "callee.py", (1e9 - 100, 1e9 - 100))
+    drop_stale_kernels(package)
+    assert list(package.rglob("*.nbi")) == []
+
+
+def test_a_folder_that_is_not_there_is_no_error(tmp_path: Path) -> None:
+    drop_stale_kernels(tmp_path / "missing" / "package.zip")
