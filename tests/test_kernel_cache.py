@@ -26,7 +26,7 @@ def test_a_kernel_younger_than_all_modules_is_kept(package: Path) -> None:
 
 
 def test_a_kernel_is_dropped_when_a_module_that_it_may_call_has_changed(package: Path) -> None:
-    """numba looks at caller.py alone, and would go on with callee.py as it was."""
+    """Numba looks at caller.py alone, and would go on with callee.py as it was."""
     os.utime(package / "callee.py", (1e9 - 100, 1e9 - 100))
     drop_stale_kernels(package)
     assert list(package.rglob("*.nbi")) == []
