@@ -49,7 +49,7 @@ def main() -> None:
     arguments = parser.parse_args()
     print(
         "scene             planner           solved  nodes: quartiles     prototype         p     samples"
-        "  duration  verified"
+        "  duration  verified  time [ms]: quartiles"
     )
     for (scene, planner), (cuts, share, duration) in PROTOTYPE.items():
         scenario = load_scenario(SCENARIOS / f"{scene}.yaml")
@@ -64,8 +64,9 @@ def main() -> None:
             p = p_value_of_quartiles(nodes, cuts)
             samples = np.median([r.samples for r in results])
             seconds = np.median([r.trajectory.duration for r in solved])
+            milliseconds = 1e3 * np.quantile([r.planning_time for r in results], (0.25, 0.5, 0.75))
             line += f" {quartiles.tolist()!s:<20} {list(cuts)!s:<17} {p:5.3f} {samples:>7.0f}"
-            line += f" {seconds:5.1f} ({duration}) {verified}/{len(solved)}"
+            line += f" {seconds:5.1f} ({duration}) {verified}/{len(solved)} {milliseconds.round(2).tolist()}"
         print(line + (f"   expected {share:.1%} solved" if cuts is None else ""), flush=True)
 
 
