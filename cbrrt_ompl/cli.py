@@ -306,7 +306,7 @@ def _demo(arguments: argparse.Namespace) -> int:
     return DONE if all(run.as_published for run in runs) else FAILED
 
 
-_DEMO_WIDTHS = (11, 7, 28, 6, 6, 6, 8, 8, 5, 5, 3, 3)
+_DEMO_WIDTHS = (11, 15, 28, 6, 6, 6, 8, 8, 5, 5, 3, 3)
 """Widths of the columns of the demo's table, where their names are not wider."""
 
 
