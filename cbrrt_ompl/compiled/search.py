@@ -88,7 +88,7 @@ class Search:
         self.counters = np.zeros(COUNTERS, dtype=np.int64)
         self.has_reached_goal = False
         self._tree = _tree_arrays(FIRST_CAPACITY, self._is_closed_loop)
-        self.failures = np.zeros(FIRST_CAPACITY if robust else 0, dtype=np.int32)
+        self.failures: NDArray[np.int32] = np.zeros(FIRST_CAPACITY if robust else 0, dtype=np.int32)
         self._make_index(FIRST_CAPACITY)
         for node, start in enumerate(starts):
             self._tree.states[node] = start
