@@ -25,6 +25,15 @@ from cbrrt_ompl.kinematics import (
     unicycle_step,
     wrap_angle,
 )
+from cbrrt_ompl.manoeuvres import (
+    BRAKE,
+    FORWARD,
+    REVERSE,
+    approach_command,
+    has_ended,
+    is_manoeuvre,
+    most_steps,
+)
 from cbrrt_ompl.robot import Gains, Limits, Robot
 from cbrrt_ompl.settings import Goal, PlanningSettings
 
@@ -39,6 +48,9 @@ MOTION_RESOLUTION = 1e-3
 
 CANDIDATES = 3
 """Extensions tried for one sample at most: the three steering rates of S-RRT."""
+
+NO_CHILD, UNTRIED = -1, -2
+"""In place of a node's latest child: it has none; it has none, and no final approach was tried from it."""
 
 
 class GoalRegion(NamedTuple):
@@ -67,12 +79,16 @@ class Model(NamedTuple):
     """eps_u of line 5 [m/s and rad/s]."""
     keep_cut: bool
     """Whether the free part of an extension that meets an obstacle is kept."""
+    approaches: bool
+    """Whether a final approach to the goal is tried from every node."""
+    brake_safe: bool
+    """Whether the robot must be able to brake to rest from every state."""
     limits: Limits
     gains: Gains
     goal: GoalRegion
 
 
-MODEL_SIZE = 6 + len(Limits._fields) + len(Gains._fields) + len(GoalRegion._fields)
+MODEL_SIZE = 8 + len(Limits._fields) + len(Gains._fields) + len(GoalRegion._fields)
 """Numbers in a packed model."""
 
 
@@ -103,8 +119,15 @@ def pack_model(law: int, robot: Robot, goal: Goal, planning: PlanningSettings) -
         planning.reference_distance(robot.limits),
         planning.equal_control_tolerance,
         planning.cut_extension == "keep",
+        planning.approaches(goal),
+        planning.brake_safe,
     )
     return np.array([*head, *robot.limits, *robot.gains, *region], dtype=float)
+
+
+def control_dimension(model: NDArray[np.float64]) -> int:
+    """Numbers of OMPL's controls under a packed model: (v, omega), a reference pose, or room for a manoeuvre's mark."""
+    return 3 if int(model[0]) == CLOSED_LOOP or model[6] else 2
 
 
 COMPILED_PLANNERS = ("cb-rrt-compiled", "s-rrt-compiled", "cb-rrt-robust")
@@ -128,9 +151,11 @@ def unpack_model(p: NDArray[np.float64]) -> Model:
         p[3],
         p[4],
         p[5] != 0.0,
-        Limits(p[6], p[7], p[8], p[9], p[10], p[11]),
-        Gains(p[12], p[13], p[14]),
-        GoalRegion(p[15], p[16], p[17], p[18], p[19], p[20]),
+        p[6] != 0.0,
+        p[7] != 0.0,
+        Limits(p[8], p[9], p[10], p[11], p[12], p[13]),
+        Gains(p[14], p[15], p[16]),
+        GoalRegion(p[17], p[18], p[19], p[20], p[21], p[22]),
     )
 
 
@@ -147,6 +172,31 @@ def in_goal(goal: GoalRegion, x: float, y: float, theta: float, v: float, omega:
     return abs(v) <= goal.speed_tolerance and abs(omega) <= goal.speed_tolerance
 
 
+@njit(cache=True)
+def manoeuvre_command(
+    state: tuple[float, float, float, float, float], manoeuvre: float, model: Model
+) -> tuple[float, float]:
+    """Command (v, omega) of the next step of a manoeuvre, [m/s, rad/s]."""
+    if manoeuvre == BRAKE:
+        return 0.0, 0.0
+    goal = model.goal
+    return approach_command(
+        state,
+        (goal.x, goal.y, goal.theta),
+        goal.heading_tolerance < math.inf,
+        manoeuvre == REVERSE,
+        model.law == STEERING,
+        model.limits,
+        model.dt,
+    )
+
+
+@njit(cache=True)
+def manoeuvre_has_ended(manoeuvre: float, state: tuple[float, float, float, float, float], goal: GoalRegion) -> bool:
+    """Whether a manoeuvre is over, see :func:`cbrrt_ompl.manoeuvres.has_ended`."""
+    return has_ended(manoeuvre, state, (goal.x, goal.y, goal.theta), goal.heading_tolerance < math.inf)
+
+
 @njit(cache=True, inline="always")  # a call costs as much as the step itself
 def advance(
     x: float,
@@ -155,9 +205,7 @@ def advance(
     v: float,
     omega: float,
     control: tuple[float, float, float],
-    law: int,
-    limits: Limits,
-    gains: Gains,
+    model: Model,
     dt: float,
 ) -> tuple[float, float, float, float, float, float, float]:
     """One integration step under a control.
@@ -168,24 +216,24 @@ def advance(
         theta: heading [rad].
         v: forward velocity [m/s].
         omega: turning rate [rad/s].
-        control: command (v, omega, unused), or the reference pose (x_r, y_r, theta_r) where the law is `CLOSED_LOOP`.
-        law: `OPEN_LOOP`, `CLOSED_LOOP` or `STEERING`.
-        limits: limits of the robot.
-        gains: gains of the closed loop.
+        control: command (v, omega, unused), or the reference pose (x_r, y_r, theta_r) where the law is `CLOSED_LOOP`;
+            or a manoeuvre, by its third number.
+        model: how the robot moves.
         dt: duration of the step [s].
 
     Returns:
         (x, y, theta, v, omega) one step later, and the command (v, omega) of the step.
     """
-    if law == STEERING:
-        command = (control[0], control[1])
-        x, y, theta, v, omega = kinematic_step(x, y, theta, command, dt)
-        return x, y, theta, v, omega, command[0], command[1]
-    if law == CLOSED_LOOP:
-        command = tracking_command(x, y, theta, control, limits, gains)
+    if is_manoeuvre(control):
+        command = manoeuvre_command((x, y, theta, v, omega), control[2], model)
+    elif model.law == CLOSED_LOOP:
+        command = tracking_command(x, y, theta, control, model.limits, model.gains)
     else:
         command = (control[0], control[1])
-    x, y, theta, v, omega = dynamic_step(x, y, theta, v, omega, command, limits, dt)
+    if model.law == STEERING:
+        x, y, theta, v, omega = kinematic_step(x, y, theta, command, dt)
+    else:
+        x, y, theta, v, omega = dynamic_step(x, y, theta, v, omega, command, model.limits, dt)
     return x, y, theta, v, omega, command[0], command[1]
 
 
@@ -220,14 +268,22 @@ def is_doomed(
 ) -> bool:
     """Whether the map alone shows that the next steps meet an obstacle: then FCL need not be asked."""
     for _ in range(steps):
-        x, y, theta, v, omega, _, _ = advance(
-            x, y, theta, v, omega, control, model.law, model.limits, model.gains, model.dt
-        )
+        x, y, theta, v, omega, _, _ = advance(x, y, theta, v, omega, control, model, model.dt)
         if certify(view, x, y) == COLLISION:
             return True
-        if in_goal(model.goal, x, y, theta, v, omega):
+        if has_come_to_end((x, y, theta, v, omega), control, model):
             return False
     return False
+
+
+@njit(cache=True)
+def has_come_to_end(
+    state: tuple[float, float, float, float, float], control: tuple[float, float, float], model: Model
+) -> bool:
+    """Whether a roll-out ends at a state before its last step: in the goal region, or with its manoeuvre."""
+    if is_manoeuvre(control):
+        return manoeuvre_has_ended(control[2], state, model.goal)
+    return in_goal(model.goal, state[0], state[1], state[2], state[3], state[4])
 
 
 class Step(NamedTuple):
@@ -361,6 +417,8 @@ def roll_out(
 ) -> tuple[int, int, tuple[float, float, float, float, float], tuple[float, float, float]]:
     """Drive from a valid state under one control until the horizon, the goal or an obstacle.
 
+    A manoeuvre has no horizon: it is free if it comes to its own end.
+
     Args:
         node: (x, y, theta, v, omega) at the start.
         control: see :func:`advance`, whose steps these are, bit for bit.
@@ -376,14 +434,20 @@ def roll_out(
     """
     x, y, theta, v, omega = node
     dt, goal, steps = model.dt, model.goal, model.steps
+    manoeuvres = is_manoeuvre(control)
+    if manoeuvres:
+        steps = most_steps(control[2], math.hypot(goal.x - x, goal.y - y), model.limits, dt)
     near_goal = goal.tolerance * goal.tolerance * (1.0 + 1e-9)
     reach = 0.0 if view.is_round else view.outer
     margin = max(certify(view, x, y), 0.0)
     is_certified = margin > 0.0
     k = 0
     while k < steps:
-        if model.law == CLOSED_LOOP:
-            v_command, omega_command = tracking_command(x, y, theta, control, model.limits, model.gains)
+        if manoeuvres or model.law == CLOSED_LOOP:
+            if manoeuvres:
+                v_command, omega_command = manoeuvre_command((x, y, theta, v, omega), control[2], model)
+            else:
+                v_command, omega_command = tracking_command(x, y, theta, control, model.limits, model.gains)
             count = 1
         else:
             v_command, omega_command = control[0], control[1]
@@ -409,10 +473,98 @@ def roll_out(
                     return k, outcome, (x, y, theta, v, omega), pose
             x, y, theta, v, omega = x1, y1, theta1, v1, omega1
             k += 1
+            if manoeuvres:
+                if manoeuvre_has_ended(control[2], (x, y, theta, v, omega), goal):
+                    return k, EXTENDED, (x, y, theta, v, omega), (x, y, theta)
+                continue
             dx, dy = x - goal.x, y - goal.y
             if dx * dx + dy * dy < near_goal and in_goal(goal, x, y, theta, v, omega):
                 return k, EXTENDED, (x, y, theta, v, omega), (x, y, theta)
-    return steps, EXTENDED, (x, y, theta, v, omega), (x, y, theta)
+    return steps, BLOCKED if manoeuvres else EXTENDED, (x, y, theta, v, omega), (x, y, theta)
+
+
+class Extension(NamedTuple):
+    """What came of an extension."""
+
+    outcome: int
+    """`EXTENDED`, `REFUSED`, `BLOCKED` or `ASK`."""
+    steps: int
+    """Integration steps."""
+    state: tuple[float, float, float, float, float]
+    """(x, y, theta, v, omega) at the end."""
+    command: tuple[float, float]
+    """Command (v, omega) that line 5 compares."""
+    control: tuple[float, float, float]
+    """Control for :func:`advance`; for `ASK` the pose in question instead."""
+
+
+@njit(cache=True)
+def approach(
+    node: tuple[float, float, float, float, float],
+    model: Model,
+    view: MapView,
+    answers: NDArray[np.float64],
+    answered: int,
+    scratch: NDArray[np.float64],
+) -> Extension:
+    """The final approach from a node to the goal, ahead or backwards, whichever is free and takes the smaller turn.
+
+    Args:
+        node: (x, y, theta, v, omega) of the node.
+        model: all settings.
+        view: the clearance map.
+        answers: what FCL has said, see :func:`find_answer`.
+        answered: rows of ``answers`` in use.
+        scratch: room for a block, of shape `SCRATCH_SHAPE`.
+
+    Returns:
+        `EXTENDED` into the goal, `BLOCKED` or `ASK`.
+    """
+    goal = model.goal
+    ahead = math.cos(node[2]) * (goal.x - node[0]) + math.sin(node[2]) * (goal.y - node[1]) >= 0.0
+    for first in (True, False):
+        manoeuvre = FORWARD if first == ahead else REVERSE
+        if manoeuvre == REVERSE and model.limits.v_min == 0.0:
+            continue
+        control = (0.0, 0.0, manoeuvre)
+        steps, outcome, state, pose = drive_safely(node, control, model, view, answers, answered, scratch)
+        if outcome == ASK:
+            return Extension(ASK, 0, node, (0.0, 0.0), pose)
+        if outcome == EXTENDED and in_goal(goal, state[0], state[1], state[2], state[3], state[4]):
+            return Extension(EXTENDED, steps, state, (0.0, 0.0), control)
+    return Extension(BLOCKED, 0, node, (0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+@njit(cache=True)
+def drive_safely(
+    node: tuple[float, float, float, float, float],
+    control: tuple[float, float, float],
+    model: Model,
+    view: MapView,
+    answers: NDArray[np.float64],
+    answered: int,
+    scratch: NDArray[np.float64],
+) -> tuple[int, int, tuple[float, float, float, float, float], tuple[float, float, float]]:
+    """:func:`roll_out`, cut before the first step whose end leaves no room to brake where the model is brake-safe.
+
+    Robots whose velocities jump stop on the spot, so that nothing is cut.
+    """
+    steps, outcome, end, pose = roll_out(node, control, model, view, answers, answered, scratch)
+    if not model.brake_safe or model.law == STEERING or outcome == ASK or (outcome == BLOCKED and not model.keep_cut):
+        return steps, outcome, end, pose
+    x, y, theta, v, omega = node
+    for k in range(steps):
+        before = (x, y, theta, v, omega)
+        x, y, theta, v, omega, _, _ = advance(x, y, theta, v, omega, control, model, model.dt)
+        stopping_distance = abs(v) * (0.5 * abs(v) / model.limits.acceleration + model.dt)
+        if view.is_round and certify(view, x, y) > stopping_distance:
+            continue
+        _, stops, _, asked = roll_out(
+            (x, y, theta, v, omega), (0.0, 0.0, BRAKE), model, view, answers, answered, scratch
+        )
+        if stops != EXTENDED:
+            return k, stops, before, asked
+    return steps, outcome, end, pose
 
 
 @njit(cache=True)
@@ -469,21 +621,6 @@ def candidate(
     return v, omega, (v, omega, 0.0)
 
 
-class Extension(NamedTuple):
-    """What came of an extension."""
-
-    outcome: int
-    """`EXTENDED`, `REFUSED`, `BLOCKED` or `ASK`."""
-    steps: int
-    """Integration steps."""
-    state: tuple[float, float, float, float, float]
-    """(x, y, theta, v, omega) at the end."""
-    command: tuple[float, float]
-    """Command (v, omega) that line 5 compares."""
-    control: tuple[float, float, float]
-    """Control for :func:`advance`; for `ASK` the pose in question instead."""
-
-
 @njit(cache=True)
 def extend(
     node: tuple[float, float, float, float, float],
@@ -498,7 +635,7 @@ def extend(
     answered: int,
     scratch: NDArray[np.float64],
 ) -> Extension:
-    """EXTEND_TRAJECTORY of the paper: from a node towards a sample.
+    """EXTEND_TRAJECTORY of the paper: from a node towards a sample, or by a final approach to the goal.
 
     CB-RRT has one candidate. S-RRT tries its three steering rates, leaves out those that the node has used or that
     collide, and takes the one that ends nearest to the reference.
@@ -507,7 +644,7 @@ def extend(
         node: (x, y, theta, v, omega) of the node.
         x_sample: the sample [m].
         y_sample: the sample [m].
-        first: latest child of the node, see :func:`is_refused`.
+        first: latest child of the node, see :func:`is_refused`, or `UNTRIED`.
         following: next older sibling of each child.
         commands: command of each child, shape (n, 2).
         model: all settings.
@@ -516,6 +653,10 @@ def extend(
         answered: rows of ``answers`` in use.
         scratch: room for a block, of shape `SCRATCH_SHAPE`.
     """
+    if first == UNTRIED and model.approaches:
+        best = approach(node, model, view, answers, answered, scratch)
+        if best.outcome != BLOCKED:
+            return best
     reference = reference_pose(node[0], node[1], node[2], x_sample, y_sample, model.look_ahead)
     best = Extension(REFUSED, 0, node, (0.0, 0.0), (0.0, 0.0, 0.0))
     nearest = math.inf
@@ -523,7 +664,7 @@ def extend(
         v, omega, control = candidate(c, node, reference, model)
         if is_refused(first, following, commands, v, omega, model.equal_control_tolerance):
             continue
-        steps, outcome, state, pose = roll_out(node, control, model, view, answers, answered, scratch)
+        steps, outcome, state, pose = drive_safely(node, control, model, view, answers, answered, scratch)
         if outcome == ASK:
             return Extension(ASK, 0, node, (v, omega), pose)
         if steps == 0 or (outcome == BLOCKED and not model.keep_cut):

@@ -67,9 +67,7 @@ def replay_path(
         control = (controls[i, 0], controls[i, 1], controls[i, 2])
         for _ in range(steps[i]):
             states[row, 0], states[row, 1], states[row, 2], states[row, 3], states[row, 4] = x, y, theta, v, omega
-            x, y, theta, v, omega, v_command, omega_command = advance(
-                x, y, theta, v, omega, control, model.law, model.limits, model.gains, model.dt
-            )
+            x, y, theta, v, omega, v_command, omega_command = advance(x, y, theta, v, omega, control, model, model.dt)
             commands[row, 0], commands[row, 1] = v_command, omega_command
             row += 1
     states[row, 0], states[row, 1], states[row, 2], states[row, 3], states[row, 4] = x, y, theta, v, omega
@@ -99,19 +97,9 @@ def replay_edges(
             continue
         x, y, theta, v, omega = states[p, 0], states[p, 1], states[p, 2], states[p, 3], states[p, 4]
         points[row, 0], points[row, 1] = x, y
+        control = (controls[i, 0], controls[i, 1], controls[i, 2])
         for _ in range(steps[i]):
-            x, y, theta, v, omega, _, _ = advance(
-                x,
-                y,
-                theta,
-                v,
-                omega,
-                (controls[i, 0], controls[i, 1], controls[i, 2]),
-                model.law,
-                model.limits,
-                model.gains,
-                model.dt,
-            )
+            x, y, theta, v, omega, _, _ = advance(x, y, theta, v, omega, control, model, model.dt)
             row += 1
             points[row, 0], points[row, 1] = x, y
         points[row + 1, 0], points[row + 1, 1] = np.nan, np.nan

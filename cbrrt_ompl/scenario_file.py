@@ -251,6 +251,8 @@ PLANNING = {
     "equal_control_tolerance": Key(number),
     "look_ahead": Key(number),
     "closed_loop": Key(flag),
+    "final_approach": Key(flag),
+    "brake_safe": Key(flag),
     "nearest_neighbour": Key(one_of(NEAREST_NEIGHBOUR)),
 }
 SCENARIO = {

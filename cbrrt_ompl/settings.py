@@ -124,6 +124,12 @@ class PlanningSettings:
     """Largest distance of the reference from its node [m]; None is ``v_max * horizon``."""
     closed_loop: bool = False
     """Evaluate the Kanayama law at every step instead of once an extension."""
+    final_approach: bool = True
+    """Try from every node to brake, turn, drive straight onto the goal's centre and turn to its heading, at rest; only
+    for goals that restrict heading or speed."""
+    brake_safe: bool = False
+    """Keep only what the robot can brake from to rest without collision, from every step on (CB-RRT; the velocities of
+    S-RRT jump, so that it always can)."""
     nearest_neighbour: str = "grid"
     """How the compiled planners find the nearest node: ``grid``, ``kd-tree`` or ``brute-force``."""
 
@@ -153,6 +159,10 @@ class PlanningSettings:
             problems.append(Problem("planning.look_ahead", self.look_ahead, "a number above 0 [m]"))
         if problems:
             raise SettingsError(problems)
+
+    def approaches(self, goal: Goal) -> bool:
+        """Whether final approaches to a goal are tried."""
+        return self.final_approach and not goal.is_position_only
 
     @property
     def steps(self) -> int:

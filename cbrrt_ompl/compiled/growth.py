@@ -15,7 +15,19 @@ from numpy.typing import NDArray
 
 from cbrrt_ompl.clearance_map import unpack_view
 from cbrrt_ompl.compiled.nearest import KD_TREE, Index, insert, nearest
-from cbrrt_ompl.extension import ASK, BLOCKED, CLOSED_LOOP, EXTENDED, REFUSED, extend, in_goal, unpack_model
+from cbrrt_ompl.extension import (
+    ASK,
+    BLOCKED,
+    CLOSED_LOOP,
+    EXTENDED,
+    NO_CHILD,
+    REFUSED,
+    UNTRIED,
+    extend,
+    in_goal,
+    unpack_model,
+)
+from cbrrt_ompl.manoeuvres import is_manoeuvre
 
 REACHED, WANT_ANSWER, WANT_ROOM, WANT_DRAWS, PAUSED = 0, 1, 2, 3, 4
 """Why the loop returns: a node in the goal, a question to FCL, full arrays, no random numbers left, enough for now."""
@@ -27,10 +39,11 @@ failures of a place it bears."""
 NOT_INDEXED = 2**31 - 1
 """Robust: failures of a node that its place stands for, so that brute force finds no other nodes than the indexes."""
 
-NODES, SAMPLES, DRAWN, REFUSALS, COLLISIONS = 0, 1, 2, 3, 4
-"""Counters of a search: nodes, samples, rows of draws used up, extensions refused by line 5, and cut by obstacles."""
+NODES, SAMPLES, DRAWN, REFUSALS, COLLISIONS, MANOEUVRE = 0, 1, 2, 3, 4, 5
+"""Counters of a search: nodes, samples, rows of draws used up, extensions refused by line 5, and cut by obstacles; and
+the manoeuvre that led to the last node, 0 if none did."""
 
-COUNTERS = 5
+COUNTERS = 6
 
 
 class TreeArrays(NamedTuple):
@@ -49,7 +62,7 @@ class TreeArrays(NamedTuple):
     steps: NDArray[np.int32]
     """Integration steps of the edge that led here, 0 at a root, shape (n,)."""
     first_child: NDArray[np.int32]
-    """Latest child, -1 if there is none, shape (n,)."""
+    """Latest child, `NO_CHILD` or `UNTRIED` if there is none, shape (n,)."""
     siblings: NDArray[np.int32]
     """Next older child of the same parent, -1 at the end, shape (n,)."""
     twins: NDArray[np.int32]
@@ -65,7 +78,7 @@ def add_node(tree: TreeArrays, index: Index, node: int, parent: int) -> None:
     A node at exactly the position of its parent or of a sibling becomes a twin of it, all others enter the index.
     """
     tree.parents[node] = parent
-    tree.first_child[node] = -1
+    tree.first_child[node] = UNTRIED
     tree.siblings[node] = -1
     tree.twins[node] = -1
     tree.places[node] = node
@@ -228,6 +241,8 @@ def grow(
             question[0], question[1], question[2] = extension.control
             return WANT_ANSWER
         answered = 0
+        if first_child[parent] == UNTRIED:
+            first_child[parent] = NO_CHILD
         counters[DRAWN] += 1
         counters[SAMPLES] += 1
         if is_robust and extension.outcome != EXTENDED:
@@ -249,5 +264,7 @@ def grow(
                 failures[node] = 0 if places[node] == node else NOT_INDEXED
             counters[NODES] += 1
             if in_goal(model.goal, x, y, theta, v, omega):
+                if is_manoeuvre(extension.control):
+                    counters[MANOEUVRE] = int(extension.control[2])
                 return REACHED
     return PAUSED

@@ -14,6 +14,7 @@ from cbrrt_ompl.compiled.growth import (
     COUNTERS,
     DRAWN,
     DRAWS,
+    MANOEUVRE,
     NODES,
     REACHED,
     ROBUST_DRAWS,
@@ -200,6 +201,8 @@ class Search:
         """States (n, 5), parents (n,), controls (n, 3) and steps (n,) of all nodes."""
         n, t = self.nodes, self._tree
         controls = t.references[:n] if self._is_closed_loop else np.pad(t.commands[:n], ((0, 0), (0, 1)))
+        if self.counters[MANOEUVRE]:
+            controls[-1] = 0.0, 0.0, self.counters[MANOEUVRE]
         return t.states[:n], t.parents[:n].astype(np.int64), controls, t.steps[:n].astype(np.int64)
 
     def path_to(self, node: int) -> list[int]:

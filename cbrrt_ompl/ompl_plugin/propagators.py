@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cbrrt_ompl.extension import CLOSED_LOOP, advance, unpack_model
+from cbrrt_ompl.extension import advance, control_dimension, unpack_model
 from cbrrt_ompl.ompl_plugin.binding import oc
 from cbrrt_ompl.ompl_plugin.reals import StateReals
 from cbrrt_ompl.ompl_plugin.space import STATE_DIMENSION
@@ -36,12 +36,12 @@ class TwoWheelPropagator(oc.StatePropagator):  # type: ignore[misc]  # OMPL has 
         super().__init__(si)
         self._reals = StateReals(space, STATE_DIMENSION)
         self._model = model
-        self._has_reference = int(model[0]) == CLOSED_LOOP
+        self._has_third = control_dimension(model) == 3
 
     def propagate(self, state: Any, control: Any, duration: float, result: Any) -> None:
         """Write the state that ``control`` leads to after ``duration`` [s]."""
         self._reals.read(state)
-        third = control[2] if self._has_reference else 0.0
+        third = control[2] if self._has_third else 0.0
         advance_packed(self._reals.values, control[0], control[1], third, self._model, duration)
         self._reals.write(result)
 
@@ -56,7 +56,5 @@ def advance_packed(
 ) -> None:
     """:func:`cbrrt_ompl.extension.advance` in place, for a caller in Python; values of shape (5,)."""
     m = unpack_model(model)
-    x, y, theta, v, omega, _, _ = advance(
-        values[0], values[1], values[2], values[3], values[4], (c0, c1, c2), m.law, m.limits, m.gains, dt
-    )
+    x, y, theta, v, omega, _, _ = advance(values[0], values[1], values[2], values[3], values[4], (c0, c1, c2), m, dt)
     values[0], values[1], values[2], values[3], values[4] = x, y, theta, v, omega

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.extension import CLOSED_LOOP
+from cbrrt_ompl.extension import control_dimension
 from cbrrt_ompl.ompl_plugin.binding import oc, ou
 from cbrrt_ompl.replay import trajectory_from_controls, tree_from_controls
 from cbrrt_ompl.trajectory import Trajectory
@@ -63,4 +63,4 @@ def _reals(space: Any, state: Any) -> NDArray[np.float64]:
 
 
 def _control(control: Any, model: NDArray[np.float64]) -> tuple[float, float, float]:
-    return control[0], control[1], control[2] if int(model[0]) == CLOSED_LOOP else 0.0
+    return control[0], control[1], control[2] if control_dimension(model) == 3 else 0.0

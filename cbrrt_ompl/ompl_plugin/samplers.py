@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from cbrrt_ompl.clearance_map import ClearanceMap, unpack_view
 from cbrrt_ompl.extension import (
     ASK,
-    CLOSED_LOOP,
     EXTENDED,
+    NO_CHILD,
     REFUSED,
     SCRATCH_SHAPE,
+    UNTRIED,
+    control_dimension,
     extend,
     unpack_model,
 )
@@ -51,8 +53,7 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         self.refused = 0
         self._node, self._sample = StateReals(space, STATE_DIMENSION), StateReals(space, STATE_DIMENSION)
         self._model, self._map = model, clearance_map
-        unpacked = unpack_model.py_func(model)
-        self._control_dimension = 3 if unpacked.law == CLOSED_LOOP else 2
+        self._control_dimension = control_dimension(model)
         self._outcome = np.empty(OUTCOME_SIZE)
         self._scratch = np.empty(SCRATCH_SHAPE)
         self._first_child: dict[bytes, int] = {}
@@ -67,9 +68,12 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         self._node.read(source)
         self._sample.read(dest)
         node = self._node.values.tobytes()
-        status = self._extend(self._first_child.get(node, -1))
+        first = self._first_child.setdefault(node, UNTRIED)
+        status = self._extend(first)
         if status == ASK:
-            status = self._ask_and_extend(self._first_child.get(node, -1))
+            status = self._ask_and_extend(first)
+        if first == UNTRIED:
+            self._first_child[node] = NO_CHILD
         if status != EXTENDED:
             self.refused += status == REFUSED
             return 0
@@ -114,7 +118,7 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         if child == len(self._following):
             self._following = np.concatenate([self._following, np.empty_like(self._following)])
             self._commands = np.concatenate([self._commands, np.empty_like(self._commands)])
-        self._following[child] = self._first_child.get(node, -1)
+        self._following[child] = self._first_child[node]
         self._commands[child] = v, omega
         self._first_child[node] = child
         self.children = child + 1
@@ -175,7 +179,7 @@ def warm_up_sampler(model: NDArray[np.float64], clearance_map: ClearanceMap) -> 
     extend_packed(
         np.array([0.5, 0.5, 0.0, 0.0, 0.0]),
         np.array([0.6, 0.6, 0.0, 0.0, 0.0]),
-        -1,
+        NO_CHILD,
         np.empty(1, dtype=np.int32),
         np.empty((1, 2)),
         model,

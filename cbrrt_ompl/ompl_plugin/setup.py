@@ -108,7 +108,7 @@ def make_equipped_setup(
     if law_of(planner, scenario.planning) == CLOSED_LOOP:
         setup = oc.SimpleSetup(make_reference_space(space, bounds))
     else:
-        setup = oc.SimpleSetup(make_control_space(space, limits))
+        setup = oc.SimpleSetup(make_control_space(space, limits, scenario.planning.approaches(scenario.goal)))
     si = setup.getSpaceInformation()
     si.setPropagationStepSize(scenario.planning.step)
     si.setMinMaxControlDuration(1, scenario.planning.steps)

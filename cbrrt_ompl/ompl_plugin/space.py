@@ -42,10 +42,20 @@ def make_state_space(bounds: Bounds, limits: Limits) -> Any:
     return space
 
 
-def make_control_space(space: Any, limits: Limits) -> Any:
-    """Velocity commands (v, omega) in R^2, within the velocity ranges."""
-    controls = oc.RealVectorControlSpace(space, 2)
-    controls.setBounds(_bounds((limits.v_min, limits.omega_min), (limits.v_max, limits.omega_max)))
+def make_control_space(space: Any, limits: Limits, has_manoeuvres: bool = False) -> Any:
+    """Velocity commands (v, omega) in R^2, within the velocity ranges.
+
+    Args:
+        space: the state space.
+        limits: ranges of v and omega.
+        has_manoeuvres: whether a third number, from 0 to 1 and without meaning, makes room for the marks of
+            :mod:`cbrrt_ompl.manoeuvres`, which are outside of that range.
+    """
+    low, high = (limits.v_min, limits.omega_min), (limits.v_max, limits.omega_max)
+    if has_manoeuvres:
+        low, high = (*low, 0.0), (*high, 1.0)
+    controls = oc.RealVectorControlSpace(space, len(low))
+    controls.setBounds(_bounds(low, high))
     return controls
 
 
