@@ -536,6 +536,23 @@ def approach(
 
 
 @njit(cache=True)
+def brake(
+    state: tuple[float, float, float, float, float],
+    model: Model,
+    view: MapView,
+    answers: NDArray[np.float64],
+    answered: int,
+    scratch: NDArray[np.float64],
+) -> tuple[int, tuple[float, float, float]]:
+    """Brake to rest from a valid state: `EXTENDED` (free), `BLOCKED` or `ASK`, and the pose that FCL must decide."""
+    stopping_distance = abs(state[3]) * (0.5 * abs(state[3]) / model.limits.acceleration + model.dt)
+    if view.is_round and certify(view, state[0], state[1]) > stopping_distance:
+        return EXTENDED, (0.0, 0.0, 0.0)
+    _, outcome, _, pose = roll_out(state, (0.0, 0.0, BRAKE), model, view, answers, answered, scratch)
+    return outcome, pose
+
+
+@njit(cache=True)
 def drive_safely(
     node: tuple[float, float, float, float, float],
     control: tuple[float, float, float],
@@ -552,16 +569,15 @@ def drive_safely(
     steps, outcome, end, pose = roll_out(node, control, model, view, answers, answered, scratch)
     if not model.brake_safe or model.law == STEERING or outcome == ASK or (outcome == BLOCKED and not model.keep_cut):
         return steps, outcome, end, pose
+    if not model.keep_cut:  # the end is the likeliest to be refused
+        stops, asked = brake(end, model, view, answers, answered, scratch)
+        if stops != EXTENDED:
+            return 0, stops, node, asked
     x, y, theta, v, omega = node
     for k in range(steps):
         before = (x, y, theta, v, omega)
         x, y, theta, v, omega, _, _ = advance(x, y, theta, v, omega, control, model, model.dt)
-        stopping_distance = abs(v) * (0.5 * abs(v) / model.limits.acceleration + model.dt)
-        if view.is_round and certify(view, x, y) > stopping_distance:
-            continue
-        _, stops, _, asked = roll_out(
-            (x, y, theta, v, omega), (0.0, 0.0, BRAKE), model, view, answers, answered, scratch
-        )
+        stops, asked = brake((x, y, theta, v, omega), model, view, answers, answered, scratch)
         if stops != EXTENDED:
             return k, stops, before, asked
     return steps, outcome, end, pose
