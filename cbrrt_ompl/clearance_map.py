@@ -2,8 +2,9 @@
 
 The distance of a point from the nearest solid is 1-Lipschitz. If FCL says that a point q has clearance c,
 then every position p nearer to q than c - r is free for a footprint inside a disc of radius r, and every p nearer than
-r' - c is in collision for a footprint that holds a disc of radius r' (c is negative below a surface). What neither
-certificate decides is asked: FCL answers with the real footprint, and the cell is split where the question was.
+r' - c is in collision for a footprint that holds a disc of radius r' (c is negative below a surface). A footprint with
+corners is a tree of such discs. What no certificate decides is asked: FCL answers with the real footprint, and the cell
+is split where the question was.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cbrrt_ompl.disc_tree import COLUMNS, disc_tree
+from cbrrt_ompl.kinematics import sine_cosine
 from cbrrt_ompl.robot import Footprint
 from cbrrt_ompl.world import CONTACT_TOLERANCE, MITRE_LIMIT, World
 
@@ -27,6 +30,9 @@ UNDECIDED = 0.0
 
 CERTIFICATE_MARGIN = 1e-6
 """What a certificate must hold by [m]: well above the rounding of FCL's closed-form distances and of its GJK."""
+
+GOOD_MARGIN = 0.02
+"""Certificates of coarse parts below this are improved by asking finer ones [m]: it saves checks further on."""
 
 SMALLEST_CELL = 0.002
 """Cells are split down to no less than this size [m]."""
@@ -59,16 +65,19 @@ class MapView(NamedTuple):
     """Radius of a disc about the robot's origin that holds the grown footprint [m]."""
     is_round: bool
     """Whether the heading makes no difference."""
+    discs: NDArray[np.float64]
+    """Parts of the footprint, see :func:`cbrrt_ompl.disc_tree.disc_tree`, shape (m, COLUMNS)."""
 
 
-FRAME_SIZE = len(MapView._fields) - 2
-"""Numbers of a view besides its two arrays."""
+FRAME_SIZE = len(MapView._fields) - 3
+"""Numbers of a view besides its arrays."""
 
 
 @njit(cache=True)
 def unpack_view(children: NDArray[np.int32], clearances: NDArray[np.float64], f: NDArray[np.float64]) -> MapView:
-    """The view out of its arrays, f of shape (FRAME_SIZE,)."""
-    return MapView(children, clearances, f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7] != 0.0)
+    """The view out of its arrays: f holds its numbers and the discs, shape (FRAME_SIZE + m * COLUMNS,)."""
+    discs = f[FRAME_SIZE:].reshape(((len(f) - FRAME_SIZE) // COLUMNS, COLUMNS))
+    return MapView(children, clearances, f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7] != 0.0, discs)
 
 
 @njit(cache=True)
@@ -113,14 +122,88 @@ def certify(view: MapView, x: float, y: float) -> float:
         return COLLISION
     if len(view.children) == 0:
         return UNDECIDED
+    return certify_disc(view, x, y, view.outer, view.inner)
+
+
+@njit(cache=True)
+def certify_disc(view: MapView, x: float, y: float, outer: float, inner: float) -> float:
+    """What the map knows about a shape that lies in one disc and holds another about the same centre.
+
+    Args:
+        view: the map, which must not be empty.
+        x: the centre, inside the bounds [m].
+        y: the centre [m].
+        outer: radius of the disc that holds the shape [m].
+        inner: radius of the disc that the shape holds [m].
+
+    Returns:
+        `COLLISION`; or `UNDECIDED`; or a distance [m] that the shape may be moved by.
+    """
     cell, _, _, _ = find_leaf(view, x, y)
     dx, dy, clearance = x - view.clearances[cell, 0], y - view.clearances[cell, 1], view.clearances[cell, 2]
     distance = math.sqrt(dx * dx + dy * dy) + CERTIFICATE_MARGIN
-    if clearance - view.outer - distance > 0.0:
-        return clearance - view.outer - distance
-    if view.inner - clearance - distance > 0.0:
+    if clearance - outer - distance > 0.0:
+        return clearance - outer - distance
+    if inner - clearance - distance > 0.0:
         return COLLISION
     return UNDECIDED
+
+
+@njit(cache=True)
+def certify_pose(view: MapView, x: float, y: float, theta: float) -> tuple[float, bool]:
+    """What the map knows about a pose.
+
+    Args:
+        view: the map.
+        x: position [m].
+        y: position [m].
+        theta: heading [rad].
+
+    Returns:
+        `COLLISION`, `UNDECIDED` or a distance [m] that no point of the footprint may move further than, to be free;
+        and whether it is one for the origin alone, whatever the heading.
+    """
+    margin = certify(view, x, y)
+    if margin != UNDECIDED or view.is_round or len(view.children) == 0:
+        return margin, True
+    margin, _, _, _ = certify_parts(view, x, y, theta)
+    return margin, False
+
+
+@njit(cache=True)
+def certify_parts(view: MapView, x: float, y: float, theta: float) -> tuple[float, int, float, float]:
+    """What the map knows about the parts of a footprint, coarse ones first.
+
+    Args:
+        view: the map, which must not be empty.
+        x: position [m].
+        y: position [m].
+        theta: heading [rad].
+
+    Returns:
+        See :func:`certify_pose`; and where it is `UNDECIDED` the smallest part that could not be decided, the row of
+        its disc and its centre [m].
+    """
+    s, c = sine_cosine(theta)
+    margin, row = min(x - view.x_min, view.x_max - x, y - view.y_min, view.y_max - y), 0  # the origin stays inside
+    while row < len(view.discs):
+        dx, dy, outer, inner = view.discs[row, 0], view.discs[row, 1], view.discs[row, 2], view.discs[row, 3]
+        x_disc, y_disc = x + c * dx - s * dy, y + s * dx + c * dy
+        found = UNDECIDED
+        if view.x_min < x_disc < view.x_max and view.y_min < y_disc < view.y_max:
+            found = certify_disc(view, x_disc, y_disc, outer, inner)
+        after = int(view.discs[row, 4])
+        if found == COLLISION:
+            return COLLISION, row, x_disc, y_disc
+        has_parts = after > row + 1
+        if found >= GOOD_MARGIN or (found != UNDECIDED and not has_parts):
+            margin = min(margin, found)
+            row = after
+        elif has_parts:
+            row += 1
+        else:
+            return UNDECIDED, row, x_disc, y_disc
+    return margin, row, x, y
 
 
 class ClearanceMap:
@@ -132,7 +215,7 @@ class ClearanceMap:
         checker: the FCL queries behind the map.
         children: see :class:`MapView`; replaced when the map grows.
         clearances: see :class:`MapView`; replaced when the map grows.
-        frame: the other numbers of the view, shape (FRAME_SIZE,).
+        frame: the other numbers of the view and the footprint's discs, see :func:`unpack_view`.
         answers: FCL's answers of the present extension, rows of (x, y, theta, margin), shape (n, 4).
         exact_queries: states that FCL had to decide with the real footprint.
     """
@@ -148,6 +231,7 @@ class ClearanceMap:
         self.checker = world.checker(footprint)
         self.enabled = enabled
         self._is_round = footprint.is_round
+        self._discs = disc_tree(footprint, MITRE_LIMIT * CONTACT_TOLERANCE)
         self.exact_queries = 0
         self._signed_clearance = world.checker(Footprint.point()).signed_clearance
         bounds = world.bounds
@@ -157,7 +241,8 @@ class ClearanceMap:
         if footprint.inscribed_radius == 0.0 and not footprint.is_round:
             inner = -math.inf  # the origin is beside the footprint, and may well be inside an obstacle
         outer = footprint.circumscribed_radius + MITRE_LIMIT * CONTACT_TOLERANCE
-        self.frame = np.array([*bounds.min, *bounds.max, size, inner, outer, footprint.is_round], dtype=float)
+        frame = [*bounds.min, *bounds.max, size, inner, outer, footprint.is_round, *self._discs.ravel()]
+        self.frame = np.array(frame, dtype=float)
         self.answers: NDArray[np.float64] = np.empty((64, 4))
         self._margins: dict[tuple[float, float, float], float] = {}
         self._cells = 1 if enabled else 0
@@ -169,8 +254,7 @@ class ClearanceMap:
     @property
     def view(self) -> MapView:
         """The map for a kernel, as it is now."""
-        x_min, y_min, x_max, y_max, size, inner, outer, is_round = self.frame.tolist()
-        return MapView(self.children, self.clearances, x_min, y_min, x_max, y_max, size, inner, outer, is_round != 0.0)
+        return unpack_view(self.children, self.clearances, self.frame)
 
     @property
     def cells(self) -> int:
@@ -182,9 +266,9 @@ class ClearanceMap:
 
         Where the map does not know yet, it is refined on the way.
         """
-        certificate = certify_packed(self.children, self.clearances, self.frame, x, y)
-        if certificate == UNDECIDED and self._refine(x, y):
-            certificate = certify_packed(self.children, self.clearances, self.frame, x, y)
+        certificate = certify_packed(self.children, self.clearances, self.frame, x, y, theta)
+        if certificate == UNDECIDED:
+            certificate = self._refine(x, y, theta)
         if certificate == UNDECIDED:
             self.exact_queries += 1
             return self.checker.collides(x, y, theta)
@@ -202,7 +286,7 @@ class ClearanceMap:
         Returns:
             Rows of ``answers`` in use afterwards.
         """
-        if self._refine(x, y) and certify_packed(self.children, self.clearances, self.frame, x, y) != UNDECIDED:
+        if self._refine(x, y, theta) != UNDECIDED:
             return answered
         if answered == len(self.answers):
             self.answers = np.concatenate([self.answers, np.empty_like(self.answers)])
@@ -215,7 +299,7 @@ class ClearanceMap:
         if self._is_round and self.enabled:
             cell, _, _, _ = find_leaf_packed(self.children, self.clearances, self.frame, x, y)
             self._ask_clearance(cell, x, y)
-            certificate = certify_packed(self.children, self.clearances, self.frame, x, y)
+            certificate = certify_packed(self.children, self.clearances, self.frame, x, y, theta)
             if certificate != UNDECIDED:
                 return max(certificate, 0.0)
             return self.checker.margin(x, y, theta)
@@ -230,24 +314,49 @@ class ClearanceMap:
         """Let FCL measure the clearance of a point in a cell, and keep it."""
         self.clearances[cell] = x, y, self._signed_clearance(x, y)
 
-    def _refine(self, x: float, y: float) -> bool:
-        """Split the cells at an undecided position until it is decided; False where nothing could be split."""
-        has_grown = False
-        while self._cells + 4 <= MAX_CELLS and self.enabled:
-            cell, x_centre, y_centre, size = find_leaf_packed(self.children, self.clearances, self.frame, x, y)
-            if size < self._smallest or self._is_hopeless(cell, x, y):
+    def _refine(self, x: float, y: float, theta: float) -> float:
+        """Split the cells at an undecided pose until it is decided, or nothing could be; the certificate then."""
+        cells = -1
+        while self.enabled and cells != self._cells:  # what is learnt about one disc may decide another
+            cells = self._cells
+            inner, outer = self.frame[5:7].tolist()
+            if self._refine_disc(x, y, outer, inner) != UNDECIDED or self._is_round:
+                break
+            found, row, x_disc, y_disc = certify_parts_packed(self.children, self.clearances, self.frame, x, y, theta)
+            while found == UNDECIDED:
+                outer, inner = self._discs[row, 2:4].tolist()
+                if self._refine_disc(x_disc, y_disc, outer, inner) == UNDECIDED:
+                    break
+                found, row, x_disc, y_disc = certify_parts_packed(
+                    self.children, self.clearances, self.frame, x, y, theta
+                )
+        return certify_packed(self.children, self.clearances, self.frame, x, y, theta)
+
+    def _refine_disc(self, x: float, y: float, outer: float, inner: float) -> float:
+        """Split the cells at a disc until it is decided, or cannot be; the certificate then."""
+        if not self._has_inside(x, y):
+            return UNDECIDED
+        view = self.children, self.clearances, self.frame
+        while self._cells + 4 <= MAX_CELLS:
+            cell, x_centre, y_centre, size = find_leaf_packed(*view, x, y)
+            if size < self._smallest or self._is_hopeless(cell, x, y, outer, inner):
                 break
             self._split(cell, x_centre, y_centre, 0.25 * size)
-            has_grown = True
-            if certify_packed(self.children, self.clearances, self.frame, x, y) != UNDECIDED:
-                break
-        return has_grown
+            view = self.children, self.clearances, self.frame
+            certificate = certify_disc_packed(*view, x, y, outer, inner)
+            if certificate != UNDECIDED:
+                return certificate
+        return UNDECIDED
 
-    def _is_hopeless(self, cell: int, x: float, y: float) -> bool:
-        """Whether a position is certainly between the two radii of the footprint, where no cell can decide it."""
+    def _has_inside(self, x: float, y: float) -> bool:
+        """Whether a point is strictly inside the bounds."""
+        x_min, y_min, x_max, y_max = self.frame[:4].tolist()
+        return bool(x_min < x < x_max and y_min < y < y_max)
+
+    def _is_hopeless(self, cell: int, x: float, y: float, outer: float, inner: float) -> bool:
+        """Whether a disc is certainly cut by a surface between its two radii, so that no cell can decide it."""
         x_asked, y_asked, clearance = self.clearances[cell].tolist()
         distance = math.hypot(x - x_asked, y - y_asked)
-        inner, outer = self.frame[5:7].tolist()
         return bool(inner <= clearance - distance and clearance + distance <= outer)
 
     def _split(self, cell: int, x: float, y: float, offset: float) -> None:
@@ -276,10 +385,42 @@ def clearance_map_for(world: World, footprint: Footprint) -> ClearanceMap:
 
 @njit(cache=True)
 def certify_packed(
-    children: NDArray[np.int32], clearances: NDArray[np.float64], frame: NDArray[np.float64], x: float, y: float
+    children: NDArray[np.int32],
+    clearances: NDArray[np.float64],
+    frame: NDArray[np.float64],
+    x: float,
+    y: float,
+    theta: float,
 ) -> float:
-    """:func:`certify` for a caller in Python, to whom arrays cost less than a named tuple."""
-    return certify(unpack_view(children, clearances, frame), x, y)
+    """:func:`certify_pose` for a caller in Python, to whom arrays cost less than a named tuple."""
+    return certify_pose(unpack_view(children, clearances, frame), x, y, theta)[0]
+
+
+@njit(cache=True)
+def certify_parts_packed(
+    children: NDArray[np.int32],
+    clearances: NDArray[np.float64],
+    frame: NDArray[np.float64],
+    x: float,
+    y: float,
+    theta: float,
+) -> tuple[float, int, float, float]:
+    """:func:`certify_parts` for a caller in Python."""
+    return certify_parts(unpack_view(children, clearances, frame), x, y, theta)
+
+
+@njit(cache=True)
+def certify_disc_packed(
+    children: NDArray[np.int32],
+    clearances: NDArray[np.float64],
+    frame: NDArray[np.float64],
+    x: float,
+    y: float,
+    outer: float,
+    inner: float,
+) -> float:
+    """:func:`certify_disc` for a caller in Python."""
+    return certify_disc(unpack_view(children, clearances, frame), x, y, outer, inner)
 
 
 @njit(cache=True)

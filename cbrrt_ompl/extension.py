@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cbrrt_ompl.clearance_map import COLLISION, UNDECIDED, MapView, certify
+from cbrrt_ompl.clearance_map import COLLISION, UNDECIDED, MapView, certify, certify_pose
 from cbrrt_ompl.control_laws import reference_pose, steering_rate, tracking_command
 from cbrrt_ompl.errors import Problem, SettingsError
 from cbrrt_ompl.kinematics import (
@@ -269,7 +269,7 @@ def is_doomed(
     """Whether the map alone shows that the next steps meet an obstacle: then FCL need not be asked."""
     for _ in range(steps):
         x, y, theta, v, omega, _, _ = advance(x, y, theta, v, omega, control, model, model.dt)
-        if certify(view, x, y) == COLLISION:
+        if certify_pose(view, x, y, theta)[0] == COLLISION:
             return True
         if has_come_to_end((x, y, theta, v, omega), control, model):
             return False
@@ -325,7 +325,7 @@ def check_step_motion(
     Args:
         step: the step.
         margin: distance proven free at its start [m].
-        is_certified: whether the map says so, for every heading; else FCL did, for the heading there.
+        is_certified: whether the margin holds for every heading; else it does for the heading there.
         view: the clearance map.
         answers: what FCL has said, see :func:`find_answer`.
         answered: rows of ``answers`` in use.
@@ -349,7 +349,7 @@ def check_step_motion(
             v = step.v + share * (step.v_end - step.v)
             omega = step.omega + share * (step.omega_end - step.omega)
             pose = unicycle_step(step.x, step.y, step.theta, step.v, step.omega, v, omega, share * dt)
-        margin, is_certified = certify(view, pose[0], pose[1]), True
+        margin, is_certified = certify_pose(view, pose[0], pose[1], pose[2])
         if margin == UNDECIDED:
             margin, is_certified = find_answer(answers, answered, pose[0], pose[1], pose[2]), False
             if margin < 0.0:
@@ -439,8 +439,8 @@ def roll_out(
         steps = most_steps(control[2], math.hypot(goal.x - x, goal.y - y), model.limits, dt)
     near_goal = goal.tolerance * goal.tolerance * (1.0 + 1e-9)
     reach = 0.0 if view.is_round else view.outer
-    margin = max(certify(view, x, y), 0.0)
-    is_certified = margin > 0.0
+    margin, is_certified = certify_pose(view, x, y, theta)
+    margin = max(margin, 0.0)
     k = 0
     while k < steps:
         if manoeuvres or model.law == CLOSED_LOOP:
@@ -546,7 +546,7 @@ def brake(
 ) -> tuple[int, tuple[float, float, float]]:
     """Brake to rest from a valid state: `EXTENDED` (free), `BLOCKED` or `ASK`, and the pose that FCL must decide."""
     stopping_distance = abs(state[3]) * (0.5 * abs(state[3]) / model.limits.acceleration + model.dt)
-    if view.is_round and certify(view, state[0], state[1]) > stopping_distance:
+    if certify(view, state[0], state[1]) > stopping_distance:
         return EXTENDED, (0.0, 0.0, 0.0)
     _, outcome, _, pose = roll_out(state, (0.0, 0.0, BRAKE), model, view, answers, answered, scratch)
     return outcome, pose

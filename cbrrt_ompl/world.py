@@ -241,13 +241,18 @@ class CollisionChecker:
         self._solids.distance(self._exact, data, fcl.defaultDistanceCallback)
         return float(data.result.min_distance)
 
+    def _room(self, x: float, y: float) -> float:
+        """Distance of the robot's origin from the bounds, which it must not leave even where no footprint is [m]."""
+        (x_min, y_min), (x_max, y_max) = self._bounds.min, self._bounds.max
+        return min(x - x_min, x_max - x, y - y_min, y_max - y)
+
     def clearance(self, x: float, y: float, theta: float) -> float:
         """Distance to the nearest solid [m] at this pose [m, m, rad]; 0 where it touches or is out of bounds."""
         if self.collides(x, y, theta):
             return 0.0
         self.queries += 1
         self._move(self._exact, x, y, theta)
-        return max(self._distance(), 0.0)
+        return min(max(self._distance(), 0.0), self._room(x, y))
 
     def margin(self, x: float, y: float, theta: float) -> float:
         """How far the footprint may move from this pose [m, m, rad] before it touches anything.
@@ -259,7 +264,7 @@ class CollisionChecker:
             return 0.0
         self.queries += 1
         self._move(self._exact, x, y, theta)
-        margin = self._distance() - MITRE_LIMIT * CONTACT_TOLERANCE
+        margin = min(self._distance() - MITRE_LIMIT * CONTACT_TOLERANCE, self._room(x, y))
         if margin > CONTACT_TOLERANCE:  # else within the rounding of two different queries
             return margin
         return 0.0 if self.collides(x, y, theta) else _ZERO_DISTANCE

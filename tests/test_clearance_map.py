@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cbrrt_ompl import clearance_map as module
-from cbrrt_ompl.clearance_map import COLLISION, UNDECIDED, ClearanceMap, certify, clearance_map_for
+from cbrrt_ompl.clearance_map import COLLISION, UNDECIDED, ClearanceMap, certify, certify_pose, clearance_map_for
 from cbrrt_ompl.obstacles import Bounds, Box, Disc, Obstacle, OrientedBox, Polygon
 from cbrrt_ompl.robot import Footprint
 from cbrrt_ompl.world import World
@@ -186,7 +186,7 @@ def compare(
         exact = collides(*pose)
         before = clearance_map.exact_queries
         found.wrong_answers += clearance_map.collides(*pose) != exact
-        certificate = certify(clearance_map.view, pose[0], pose[1])
+        certificate, _ = certify_pose(clearance_map.view, *pose)
         found.wrong_certificates += certificate != UNDECIDED and (certificate == COLLISION) != exact
         found.certified += clearance_map.exact_queries == before
         found.in_collision += exact
@@ -237,12 +237,16 @@ def test_every_pose_within_a_certified_margin_is_free(
     margins = 0
     for pose in (next(poses) for poses in (uniform_poses(world, rng), border_poses(world, footprint, rng)) * 300):
         clearance_map.collides(*pose)
-        margin = certify(clearance_map.view, pose[0], pose[1])
+        margin, for_every_heading = certify_pose(clearance_map.view, *pose)
         if margin in (COLLISION, UNDECIDED):
             continue
         margins += 1
-        for share, angle, theta in rng.uniform(0.0, (1.0, math.tau, math.tau), (4, 3)):
-            r = margin * (1.0 - share**4)  # mostly close to the end
+        for share, angle, turn in rng.uniform((0.0, 0.0, -1.0), (1.0, math.tau, 1.0), (4, 3)).tolist():
+            used = margin * (1.0 - share**4)  # mostly close to the end
+            if for_every_heading:
+                r, theta = used, math.pi * turn
+            else:
+                r, theta = used * (1.0 - abs(turn)), pose[2] + used * turn / footprint.circumscribed_radius
             assert not clearance_map.checker.collides(
                 pose[0] + r * math.cos(angle), pose[1] + r * math.sin(angle), theta
             )
