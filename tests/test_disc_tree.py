@@ -60,7 +60,7 @@ def test_a_disc_holds_the_part_that_its_own_parts_stand_for(footprint: Footprint
 
 def test_every_inner_disc_lies_in_the_footprint(footprint: Footprint) -> None:
     polygon = shapely.Polygon(footprint.vertices)
-    discs = [(x, y, inner) for x, y, _, inner, _ in disc_tree(footprint, GROWTH) if inner > 0.0]
+    discs = [(x, y, inner) for x, y, _, inner, _ in disc_tree(footprint, GROWTH) if inner > 1e-6]
     assert discs
     assert all(polygon.contains(shapely.Point(x, y).buffer(0.9999 * inner)) for x, y, inner in discs)
 
