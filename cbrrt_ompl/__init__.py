@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from cbrrt_ompl.ompl_plugin.setup import make_setup
     from cbrrt_ompl.planning import PlanResult, plan
     from cbrrt_ompl.robot import Footprint, Gains, Limits, Robot
+    from cbrrt_ompl.robots import ROBOTS
     from cbrrt_ompl.scenario import Scenario, load_scenario, save_scenario
     from cbrrt_ompl.settings import Goal, PlanningSettings, State
     from cbrrt_ompl.trajectory import Trajectory
@@ -38,6 +39,7 @@ __all__ = [
     "PlanResult",
     "PlanningSettings",
     "Polygon",
+    "ROBOTS",
     "Robot",
     "Scenario",
     "State",
@@ -60,6 +62,7 @@ _MODULES = {
     "ompl_plugin.setup": ("make_setup",),
     "planning": ("PlanResult", "plan"),
     "robot": ("Footprint", "Gains", "Limits", "Robot"),
+    "robots": ("ROBOTS",),
     "scenario": ("Scenario", "load_scenario", "save_scenario"),
     "settings": ("Goal", "PlanningSettings", "State"),
     "trajectory": ("Trajectory",),

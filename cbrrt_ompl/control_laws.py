@@ -6,7 +6,7 @@ import math
 
 from numba import njit
 
-from cbrrt_ompl.kinematics import clamp, wrap_angle
+from cbrrt_ompl.kinematics import clamp, saturate, wrap_angle
 from cbrrt_ompl.robot import Gains, Limits
 
 
@@ -83,9 +83,10 @@ def kanayama_command(
 def tracking_command(
     x: float, y: float, theta: float, reference: tuple[float, float, float], limits: Limits, gains: Gains
 ) -> tuple[float, float]:
-    """Command of CB-RRT: the Kanayama law for a reference at full speed, clamped to the velocity ranges.
+    """Command of CB-RRT: the Kanayama law for a reference at full speed, clamped to the limits.
 
-    A reference behind a robot that must not reverse gives v = 0: a point turn.
+    The velocities are clamped to their ranges, each on its own; then both are scaled to what the wheels can do. A
+    reference behind a robot that must not reverse gives v = 0: a point turn.
 
     Args:
         x: position of the robot [m].
@@ -96,11 +97,12 @@ def tracking_command(
         gains: controller gains.
 
     Returns:
-        Command (v, omega) within the velocity ranges, [m/s, rad/s].
+        Command (v, omega) within the limits of the velocities and the wheels, [m/s, rad/s].
     """
     error = error_posture(x, y, theta, reference)
     v, omega = kanayama_command(error, limits.v_max, 0.0, gains)
-    return clamp(v, limits.v_min, limits.v_max), clamp(omega, limits.omega_min, limits.omega_max)
+    v, omega = clamp(v, limits.v_min, limits.v_max), clamp(omega, limits.omega_min, limits.omega_max)
+    return saturate(v, omega, limits)
 
 
 @njit(cache=True)

@@ -19,9 +19,12 @@ from cbrrt_ompl.errors import Problem, SettingsError
 from cbrrt_ompl.kinematics import (
     displacement,
     dynamic_step,
+    has_wheel_limits,
+    joint_ramp,
     kinematic_step,
     middle_heading,
     ramp,
+    saturate,
     unicycle_step,
     wrap_angle,
 )
@@ -153,9 +156,9 @@ def unpack_model(p: NDArray[np.float64]) -> Model:
         p[5] != 0.0,
         p[6] != 0.0,
         p[7] != 0.0,
-        Limits(p[8], p[9], p[10], p[11], p[12], p[13]),
-        Gains(p[14], p[15], p[16]),
-        GoalRegion(p[17], p[18], p[19], p[20], p[21], p[22]),
+        Limits(p[8], p[9], p[10], p[11], p[12], p[13], p[14], p[15], p[16]),
+        Gains(p[17], p[18], p[19]),
+        GoalRegion(p[20], p[21], p[22], p[23], p[24], p[25]),
     )
 
 
@@ -222,7 +225,7 @@ def advance(
         dt: duration of the step [s].
 
     Returns:
-        (x, y, theta, v, omega) one step later, and the command (v, omega) of the step.
+        (x, y, theta, v, omega) one step later, and the command (v, omega) of the step, which the wheels can do.
     """
     if is_manoeuvre(control):
         command = manoeuvre_command((x, y, theta, v, omega), control[2], model)
@@ -230,6 +233,7 @@ def advance(
         command = tracking_command(x, y, theta, control, model.limits, model.gains)
     else:
         command = (control[0], control[1])
+    command = saturate(command[0], command[1], model.limits)
     if model.law == STEERING:
         x, y, theta, v, omega = kinematic_step(x, y, theta, command, dt)
     else:
@@ -389,18 +393,25 @@ def integrate_block(
         model: how the robot moves.
         scratch: its rows v, omega and theta are filled up to ``steps``, the others up to ``steps - 1``.
     """
-    dt = model.dt
+    dt, limits = model.dt, model.limits
+    v_command, omega_command = saturate(v_command, omega_command, limits)
     vs, omegas, thetas, middles, dxs, dys = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4], scratch[5]
     if model.law == STEERING:
         v, omega = v_command, omega_command
-    most, most_angular = model.limits.acceleration * dt, model.limits.angular_acceleration * dt
+    most, most_angular = limits.acceleration * dt, limits.angular_acceleration * dt
     vs[0], omegas[0], thetas[0] = v, omega, theta
+    if has_wheel_limits(limits):
+        for i in range(steps):
+            v, omega = joint_ramp(v, omega, v_command, omega_command, limits, dt)
+            vs[i + 1], omegas[i + 1] = v, omega
+    else:
+        for i in range(steps):
+            v, omega = ramp(v, v_command, most), ramp(omega, omega_command, most_angular)
+            vs[i + 1], omegas[i + 1] = v, omega
     for i in range(steps):
-        v, omega_next = ramp(v, v_command, most), ramp(omega, omega_command, most_angular)
-        middles[i] = middle_heading(theta, omega, omega_next, dt)
-        theta = wrap_angle(theta + 0.5 * (omega + omega_next) * dt)
-        omega = omega_next
-        vs[i + 1], omegas[i + 1], thetas[i + 1] = v, omega, theta
+        middles[i] = middle_heading(theta, omegas[i], omegas[i + 1], dt)
+        theta = wrap_angle(theta + 0.5 * (omegas[i] + omegas[i + 1]) * dt)
+        thetas[i + 1] = theta
     for i in range(steps):
         dxs[i], dys[i] = displacement(middles[i], vs[i], omegas[i], vs[i + 1], omegas[i + 1], dt)
 
@@ -629,7 +640,7 @@ def candidate(
         The command (v, omega) that line 5 compares, and the control for :func:`advance`.
     """
     if model.law == STEERING:
-        v, omega = model.limits.v_max, steering_rate(index, model.limits)
+        v, omega = saturate(model.limits.v_max, steering_rate(index, model.limits), model.limits)
         return v, omega, (v, omega, 0.0)
     v, omega = tracking_command(node[0], node[1], node[2], reference, model.limits, model.gains)
     if model.law == CLOSED_LOOP:

@@ -58,6 +58,72 @@ def ramp(current: float, command: float, largest_change: float) -> float:
     return command
 
 
+@njit(cache=True)
+def has_wheel_limits(limits: Limits) -> bool:
+    """:attr:`cbrrt_ompl.robot.Limits.has_wheel_limits`, for kernels."""
+    return limits.wheel_speed < math.inf or limits.wheel_acceleration < math.inf
+
+
+INSIDE = 1.0 - 1e-15
+"""Leaves room for the rounding of a product, so that a scaled command is within its limit and not scaled again."""
+
+
+@njit(cache=True)
+def saturate(v: float, omega: float, limits: Limits) -> tuple[float, float]:
+    """The fastest command on the same arc, no faster than asked for, that the wheels can drive.
+
+    Args:
+        v: forward velocity asked for [m/s].
+        omega: turning rate asked for [rad/s].
+        limits: limits of the robot.
+
+    Returns:
+        (v, omega), both scaled by one factor where |v| + |omega| wheel_separation / 2 exceeds the wheels' speed, else
+        as they came.
+    """
+    rim = abs(v) + 0.5 * limits.wheel_separation * abs(omega)
+    if rim <= limits.wheel_speed:
+        return v, omega
+    share = INSIDE * limits.wheel_speed / rim
+    return v * share, omega * share
+
+
+@njit(cache=True)
+def joint_ramp(
+    v: float, omega: float, v_command: float, omega_command: float, limits: Limits, dt: float
+) -> tuple[float, float]:
+    """Velocities one step later on the straight line to a command: the ramp of a robot with wheel limits.
+
+    Both changes are scaled by one factor, so that v, omega and either wheel all keep their accelerations; on the line
+    between two velocities that keep all limits, all velocities do.
+
+    Args:
+        v: present forward velocity [m/s].
+        omega: present turning rate [rad/s].
+        v_command: forward velocity asked for [m/s].
+        omega_command: turning rate asked for [rad/s].
+        limits: limits of the robot.
+        dt: duration of the step [s].
+
+    Returns:
+        (v, omega) at the end of the step: the command where it is in reach.
+
+    Note:
+        The paper ramps v and omega independently of each other: :func:`ramp`, for robots without wheel limits.
+    """
+    dv, domega = v_command - v, omega_command - omega
+    size, turn = abs(dv), abs(domega)
+    needed = max(size / limits.acceleration, turn / limits.angular_acceleration)
+    needed = max(needed, (size + 0.5 * limits.wheel_separation * turn) / limits.wheel_acceleration)
+    if needed <= dt:
+        return v_command, omega_command
+    share = dt / needed
+    return (
+        clamp(v + share * dv, min(v, v_command), max(v, v_command)),
+        clamp(omega + share * domega, min(omega, omega_command), max(omega, omega_command)),
+    )
+
+
 ONE_TWELFTH, ONE_24TH, ONE_80TH = 1.0 / 12.0, 1.0 / 24.0, 1.0 / 80.0
 """Factors, since a division takes the kernels as long as all the rest of a line."""
 
@@ -161,6 +227,8 @@ def dynamic_step(
 ) -> tuple[float, float, float, float, float]:
     """State one step later, the velocities ramping to a command under the acceleration limits.
 
+    Robots with wheel limits ramp by :func:`joint_ramp`, all others by :func:`ramp`.
+
     Args:
         x: position [m].
         y: position [m].
@@ -174,8 +242,11 @@ def dynamic_step(
     Returns:
         (x, y, theta, v, omega) at the end of the step.
     """
-    v_next = ramp(v, command[0], limits.acceleration * dt)
-    omega_next = ramp(omega, command[1], limits.angular_acceleration * dt)
+    if has_wheel_limits(limits):
+        v_next, omega_next = joint_ramp(v, omega, command[0], command[1], limits, dt)
+    else:
+        v_next = ramp(v, command[0], limits.acceleration * dt)
+        omega_next = ramp(omega, command[1], limits.angular_acceleration * dt)
     x, y, theta = unicycle_step(x, y, theta, v, omega, v_next, omega_next, dt)
     return x, y, theta, v_next, omega_next
 

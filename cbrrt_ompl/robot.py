@@ -31,22 +31,36 @@ class Limits(NamedTuple):
     """Largest change of v [m/s^2]."""
     angular_acceleration: float = math.radians(30.0)
     """Largest change of omega [rad/s^2]."""
+    wheel_separation: float = 0.0
+    """Distance between the wheels [m]; 0 where no wheel limit is given."""
+    wheel_speed: float = math.inf
+    """Largest speed of a wheel over the ground, |v| + |omega| wheel_separation / 2 [m/s]."""
+    wheel_acceleration: float = math.inf
+    """Largest change of a wheel's speed [m/s^2]."""
+
+    @property
+    def has_wheel_limits(self) -> bool:
+        """Whether a wheel limits the robot; v and omega then change together, not each on its own."""
+        return self.wheel_speed < math.inf or self.wheel_acceleration < math.inf
 
     def problems(self) -> list[Problem]:
         """What is wrong with these limits, one entry a mistake."""
         found = [
             Problem(f"limits.{name}", value, "a finite number")
             for name, value in zip(self._fields, self, strict=True)
-            if not math.isfinite(value)
+            if not (math.isfinite(value) or (value == math.inf and name in ("wheel_speed", "wheel_acceleration")))
         ]
         if found:
             return found
         for name, low, high in (("v", self.v_min, self.v_max), ("omega", self.omega_min, self.omega_max)):
             if not low <= 0.0 < high:
                 found.append(Problem(f"limits.{name}", [low, high], "a range [low, high] with low <= 0 < high"))
-        for name in ("acceleration", "angular_acceleration"):
+        for name in ("acceleration", "angular_acceleration", "wheel_speed", "wheel_acceleration"):
             if getattr(self, name) <= 0.0:
                 found.append(Problem(f"limits.{name}", getattr(self, name), "a number above 0"))
+        if self.wheel_separation < 0.0 or (self.has_wheel_limits and self.wheel_separation == 0.0):
+            expected = "the distance between the wheels, above 0 [m]"
+            found.append(Problem("limits.wheel_separation", self.wheel_separation, expected))
         return found
 
 

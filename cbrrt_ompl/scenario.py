@@ -204,6 +204,10 @@ def _velocity_problems(start: State, limits: Limits) -> Iterator[Problem]:
         if not low <= getattr(start, name) <= high:
             expected = f"{low:.6g} to {high:.6g} {unit}, robot.limits.{name}"
             yield Problem(f"start.{name}", getattr(start, name), expected)
+    rim = abs(start.v) + 0.5 * limits.wheel_separation * abs(start.omega)
+    if rim > limits.wheel_speed * (1.0 + 1e-9):
+        expected = f"wheels no faster than {limits.wheel_speed:.6g} m/s, robot.limits.wheel_speed (here {rim:.6g} m/s)"
+        yield Problem("start", {"v": start.v, "omega": start.omega}, expected)
 
 
 def _goal_problems(goal: Goal, world: World, robot: Robot | None) -> Iterator[Problem]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +14,7 @@ from cbrrt_ompl.errors import MISSING, InputError, Problem
 from cbrrt_ompl.obstacles import Bounds, Box, Disc, Obstacle, OrientedBox, Polygon
 from cbrrt_ompl.occupancy import UNKNOWN_CELLS
 from cbrrt_ompl.robot import Footprint, Gains, Limits, Robot
+from cbrrt_ompl.robots import ROBOTS
 from cbrrt_ompl.sections import (
     Key,
     Report,
@@ -164,21 +167,37 @@ def _load_map(
         return None, []
 
 
-def _limits(value: object, path: str, report: Report) -> Limits | None:
+def _limits(value: object, path: str, report: Report) -> dict[str, Any] | None:
+    """The limits that are given, by their names in `Limits`."""
     values = read_section(value, path, LIMITS, report)
     if values is None:
         return None
     for name in {"v", "omega"} & values.keys():
         values[f"{name}_min"], values[f"{name}_max"] = values.pop(name)
-    return Limits(**values)
+    return values
 
 
-def _gains(value: object, path: str, report: Report) -> Gains | None:
-    return build(Gains, read_section(value, path, GAINS, report), path, report)
+def _gains(value: object, path: str, report: Report) -> dict[str, Any] | None:
+    """The gains that are given."""
+    return read_section(value, path, GAINS, report)
+
+
+def _model(value: object, path: str, report: Report) -> Robot | None:
+    name = one_of(list(ROBOTS))(value, path, report)
+    return None if name is None else ROBOTS[name]
 
 
 def _robot(value: object, path: str, report: Report) -> Robot | None:
-    return build(Robot, read_section(value, path, ROBOT, report), path, report)
+    """A ready robot by its name; or one described in full, or by what differs from a ready one."""
+    if isinstance(value, str):
+        return _model(value, path, report)
+    values = read_section(value, path, ROBOT, report)
+    if values is None:
+        return None
+    model = values.pop("model", Robot())
+    for part in {"limits", "gains"} & values.keys():
+        values[part] = getattr(model, part)._replace(**values[part])
+    return build(partial(replace, model), values, path, report)
 
 
 def _start(value: object, path: str, report: Report) -> State | None:
@@ -224,9 +243,12 @@ LIMITS = {
     "omega": Key(_range, is_angle=True),
     "acceleration": Key(number),
     "angular_acceleration": Key(number, is_angle=True),
+    "wheel_separation": Key(number),
+    "wheel_speed": Key(number),
+    "wheel_acceleration": Key(number),
 }
 GAINS = {name: Key(number) for name in Gains._fields}
-ROBOT = {"footprint": Key(_footprint), "limits": Key(_limits), "gains": Key(_gains)}
+ROBOT = {"model": Key(_model), "footprint": Key(_footprint), "limits": Key(_limits), "gains": Key(_gains)}
 START = {
     "x": _x,
     "y": _y,
@@ -303,9 +325,17 @@ def _robot_data(robot: Robot) -> dict[str, Any]:
             "omega": _floats((limits.omega_min, limits.omega_max)),
             "acceleration": float(limits.acceleration),
             "angular_acceleration": float(limits.angular_acceleration),
+            **_wheel_data(limits),
         },
         "gains": {name: float(value) for name, value in robot.gains._asdict().items()},
     }
+
+
+def _wheel_data(limits: Limits) -> dict[str, float]:
+    """The limits of the wheels that there are."""
+    separation = {"wheel_separation": float(limits.wheel_separation)} if limits.wheel_separation else {}
+    given = {name: float(getattr(limits, name)) for name in ("wheel_speed", "wheel_acceleration")}
+    return separation | {name: value for name, value in given.items() if value < math.inf}
 
 
 def _goal_data(goal: Goal) -> dict[str, Any]:
