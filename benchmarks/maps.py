@@ -20,13 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cbrrt_ompl import (
+    ROBOTS,
     Bounds,
-    Footprint,
-    Gains,
     Goal,
-    Limits,
     PlanningSettings,
-    Robot,
     Scenario,
     State,
     World,
@@ -37,19 +34,7 @@ from cbrrt_ompl.maps.discs import load_discs
 from cbrrt_ompl.maps.loading import load_map
 from cbrrt_ompl.maps.occupancy_map import OccupancyMap
 
-WAFFLE_PI = Robot(
-    Footprint.disc(0.22),
-    Limits(0.0, 0.26, -1.82, 1.82, 1.0, 3.2),
-    Gains(1.5, 10.0, 3.0),  # turn as fast as the robot can where the paper's would turn at 0.1 rad/s
-)
-"""TurtleBot3 Waffle Pi: ROBOTIS' top speeds; the disc and the angular acceleration of Nav2's configuration."""
-
-JACKAL = Robot(
-    Footprint.polygon([[-0.254, -0.215], [0.254, -0.215], [0.254, 0.215], [-0.254, 0.215]]),
-    Limits(0.0, 2.0, -2.0, 2.0, 2.0, 2.0 * math.pi),
-)
-"""Clearpath Jackal: 2 m/s, with 2 rad/s and 2 m/s^2 assumed."""
-
+WAFFLE_PI, JACKAL = ROBOTS["turtlebot3_waffle_pi"], ROBOTS["jackal"]
 MAP_PLANNING = PlanningSettings(horizon=2.0, step=0.05, goal_bias=0.05, max_samples=10**9)
 BARN_PLANNING = PlanningSettings(horizon=1.0, step=0.05, goal_bias=0.05, max_samples=10**9)
 BARN_BOUNDS = Bounds((-4.575, 0.0), (0.075, 14.5))
@@ -85,7 +70,7 @@ def map_scenarios(path: Path, pairs: int) -> Iterator[Scenario]:
     """Random pairs of free poses in a map, all in one world."""
     grid = load_map(path)
     world = grid.to_world()
-    cells = largest_free_part(grid, WAFFLE_PI.footprint.radius)
+    cells = largest_free_part(grid, WAFFLE_PI.footprint.circumscribed_radius)
     rng = np.random.default_rng(0)
     x0, y0, yaw = grid.origin
     for _ in range(pairs):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -45,7 +45,8 @@ class Violation:
     """One condition that a trajectory breaks, once or for a while."""
 
     kind: str
-    """``start``, ``goal``, ``velocity``, ``command``, ``acceleration``, ``motion``, ``collision`` or ``sampling``."""
+    """What is broken: ``start``, ``goal``, ``velocity``, ``command``, ``acceleration``, ``wheel speed``, ``wheel
+    acceleration``, ``motion``, ``collision`` or ``sampling``."""
     time: float
     """When it is broken first [s]."""
     message: str
@@ -134,10 +135,13 @@ def verify(trajectory: Trajectory, scenario: Scenario, *, tolerance: float = 1e-
         grid = _Grid.of(trajectory, scenario.planning.step)
         again = _integrate_again(trajectory, limits, grid)
         accelerations = [] if trajectory.kinematic else list(_acceleration_violations(trajectory, limits))
+        if limits.has_wheel_limits and not trajectory.kinematic:
+            accelerations += _wheel_acceleration_violations(trajectory, limits)
         collisions, checks = _collisions(trajectory, again, scenario, grid)
         violations = (
             *_start_violations(trajectory, scenario),
             *_limit_violations(trajectory, limits),
+            *_wheel_speed_violations(trajectory, limits),
             *accelerations,
             *_motion_violations(trajectory, again, tolerance),
             *collisions,
@@ -211,6 +215,8 @@ def _integrate_again(trajectory: Trajectory, limits: Limits, grid: _Grid) -> _Mo
         ends = commands if trajectory.kinematic else _ramp(start, commands, most)
         columns.append(np.concatenate([[start], ends]))
     v, omega = columns
+    if limits.has_wheel_limits and not trajectory.kinematic:
+        v, omega = _ramp_together(trajectory, limits)
     v0, w0 = (v[1:], omega[1:]) if trajectory.kinematic else (v[:-1], omega[:-1])
     velocities = np.array([v0, v[1:], w0, omega[1:]])  # (4, n - 1)
     theta = trajectory.theta[0] + np.concatenate([[0.0], np.cumsum(0.5 * (w0 + omega[1:]) * steps)])
@@ -230,6 +236,29 @@ def _ramp(start: float, commands: NDArray[np.float64], most: NDArray[np.float64]
         value += min(max(command - value, -change), change)
         ends.append(value)
     return np.array(ends)
+
+
+def _ramp_together(trajectory: Trajectory, limits: Limits) -> NDArray[np.float64]:
+    """Both velocities at the rows where wheels limit the robot, shape (2, n).
+
+    They approach the command along the straight line between them, as far as v, omega and either wheel get in a step.
+    """
+    velocity = np.array([trajectory.v[0], trajectory.omega[0]])
+    ends = [velocity]
+    rates = np.array([limits.acceleration, limits.angular_acceleration, *2 * (limits.wheel_acceleration,)])
+    commands = np.column_stack([trajectory.v_command, trajectory.omega_command])
+    for command, step in zip(commands[:-1], np.diff(trajectory.t), strict=True):
+        change = command - velocity
+        duration = np.abs([*change, *_wheel_speeds(change[0], change[1], limits)]) / rates
+        velocity = command if duration.max() <= step else velocity + change * (step / duration.max())
+        ends.append(velocity)
+    return np.transpose(ends)
+
+
+def _wheel_speeds(v: ArrayLike, omega: ArrayLike, limits: Limits) -> tuple[Any, Any]:
+    """Speeds of the left and the right wheel over the ground [m/s]."""
+    turn = np.multiply(omega, 0.5 * limits.wheel_separation)
+    return np.subtract(v, turn), np.add(v, turn)
 
 
 def _offsets(
@@ -336,6 +365,38 @@ def _acceleration_violations(trajectory: Trajectory, limits: Limits) -> Iterator
             f"limit {most:.6g} {unit}",
             changes / steps,
             broken,
+            trajectory.t[:-1],
+            "steps",
+        )
+
+
+def _wheel_speed_violations(trajectory: Trajectory, limits: Limits) -> Iterator[Violation]:
+    """Wheels that are too fast, or would be by the command."""
+    for text, v, omega in (
+        ("", trajectory.v, trajectory.omega),
+        (" by command", trajectory.v_command, trajectory.omega_command),
+    ):
+        for side, speeds in zip(("left", "right"), _wheel_speeds(v, omega, limits), strict=True):
+            broken = ~(np.abs(speeds) <= limits.wheel_speed * (1.0 + _SLACK))
+            text_of_side, limit = f"{side} wheel at {{}} m/s{text}", f"limit {limits.wheel_speed:.6g} m/s"
+            yield from _violation("wheel speed", text_of_side, limit, speeds, broken, trajectory.t, "rows")
+
+
+def _wheel_acceleration_violations(trajectory: Trajectory, limits: Limits) -> Iterator[Violation]:
+    """Wheels whose speed changes faster than the limit allows."""
+    steps, most = np.diff(trajectory.t), limits.wheel_acceleration
+    size = np.abs(trajectory.v) + np.abs(trajectory.omega) * limits.wheel_separation
+    rounding = 8.0 * np.spacing(np.maximum(size[1:], size[:-1]))
+    if math.isfinite(most):
+        rounding += 4.0 * most * np.spacing(np.abs(trajectory.t[1:]))
+    for side, speeds in zip(("left", "right"), _wheel_speeds(trajectory.v, trajectory.omega, limits), strict=True):
+        changes = np.diff(speeds)
+        yield from _violation(
+            "wheel acceleration",
+            f"speed of the {side} wheel changes by {{}} m/s^2",
+            f"limit {most:.6g} m/s^2",
+            changes / steps,
+            ~(np.abs(changes) <= most * steps * (1.0 + _SLACK) + rounding),
             trajectory.t[:-1],
             "steps",
         )

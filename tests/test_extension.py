@@ -117,7 +117,7 @@ def between(a: NDArray[np.float64], b: NDArray[np.float64], share: float, model:
 class TestModel:
     @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
     def test_it_survives_packing(self, law: int) -> None:
-        limits = Limits(-0.1, 1.1, -0.2, 1.2, 0.3, 1.3)
+        limits = Limits(-0.1, 1.1, -0.2, 1.2, 0.3, 1.3, 0.4, 1.4, 0.5)
         robot = Robot(limits=limits, gains=Gains(1.0, 2.0, 3.0))
         goal = Goal(1.5, 2.5, 0.4, theta=0.7, heading_tolerance=0.2, speed_tolerance=0.1)
         planning = PlanningSettings(

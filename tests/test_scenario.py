@@ -617,7 +617,8 @@ def obstacles(draw: st.DrawFn) -> Obstacle:
 @st.composite
 def scenarios_of_any_kind(draw: st.DrawFn) -> Scenario:
     a, b = draw(sizes), draw(sizes)
-    limits = Limits(-draw(sizes), 0.5 + a, -draw(sizes), 0.5 + b, draw(sizes), draw(sizes))
+    wheels = draw(st.sampled_from([(), (a,), (a, 1.0 + a + b), (b, math.inf, a), (b, 1.0 + a + b, b)]))
+    limits = Limits(-draw(sizes), 0.5 + a, -draw(sizes), 0.5 + b, draw(sizes), draw(sizes), *wheels)
     footprint = draw(
         st.sampled_from(
             [Footprint.point(), Footprint.disc(a / 3), Footprint.polygon([(-a, -b / 3), (a / 2, 0.0), (-a, b / 3)])]
