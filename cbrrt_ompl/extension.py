@@ -370,7 +370,7 @@ SCRATCH_SHAPE = (6, BLOCK + 1)
 """Room for a block: v, omega, theta, heading in the middle of the step, dx, dy."""
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)  # else LLVM may leave it a call, which makes an extension a tenth slower
 def integrate_block(
     theta: float,
     v: float,
@@ -402,16 +402,18 @@ def integrate_block(
     vs[0], omegas[0], thetas[0] = v, omega, theta
     if has_wheel_limits(limits):
         for i in range(steps):
-            v, omega = joint_ramp(v, omega, v_command, omega_command, limits, dt)
-            vs[i + 1], omegas[i + 1] = v, omega
+            v, omega_next = joint_ramp(v, omega, v_command, omega_command, limits, dt)
+            middles[i] = middle_heading(theta, omega, omega_next, dt)
+            theta = wrap_angle(theta + 0.5 * (omega + omega_next) * dt)
+            omega = omega_next
+            vs[i + 1], omegas[i + 1], thetas[i + 1] = v, omega, theta
     else:
         for i in range(steps):
-            v, omega = ramp(v, v_command, most), ramp(omega, omega_command, most_angular)
-            vs[i + 1], omegas[i + 1] = v, omega
-    for i in range(steps):
-        middles[i] = middle_heading(theta, omegas[i], omegas[i + 1], dt)
-        theta = wrap_angle(theta + 0.5 * (omegas[i] + omegas[i + 1]) * dt)
-        thetas[i + 1] = theta
+            v, omega_next = ramp(v, v_command, most), ramp(omega, omega_command, most_angular)
+            middles[i] = middle_heading(theta, omega, omega_next, dt)
+            theta = wrap_angle(theta + 0.5 * (omega + omega_next) * dt)
+            omega = omega_next
+            vs[i + 1], omegas[i + 1], thetas[i + 1] = v, omega, theta
     for i in range(steps):
         dxs[i], dys[i] = displacement(middles[i], vs[i], omegas[i], vs[i + 1], omegas[i + 1], dt)
 
