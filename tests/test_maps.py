@@ -22,7 +22,7 @@ from PIL import Image
 from cbrrt_ompl.errors import InputError, MapError
 from cbrrt_ompl.maps import OccupancyMap, load_discs, load_dynobench, load_map, rasterize, save_map
 from cbrrt_ompl.obstacles import Obstacle, OrientedBox
-from cbrrt_ompl.robot import Footprint
+from cbrrt_ompl.robot import Footprint, Limits
 from cbrrt_ompl.scenario import load_scenario
 from cbrrt_ompl.world import Bounds, Box, Disc, Polygon, World
 
@@ -574,7 +574,7 @@ def test_a_dynobench_problem_is_a_scenario(tmp_path: Path) -> None:
     assert found.name == "unicycle2_v0-wall"
     assert found.world.bounds == Bounds((0.0, 0.0), (6.0, 4.0))
     assert found.world.obstacles == (Box((2.9, 0.0), (3.1, 2.0)),)
-    assert found.robot.limits == (-0.5, 0.5, -0.4, 0.4, 0.25, 0.2)
+    assert found.robot.limits == Limits(-0.5, 0.5, -0.4, 0.4, 0.25, 0.2)
     assert found.robot.footprint == Footprint.polygon([(-0.25, -0.125), (0.25, -0.125), (0.25, 0.125), (-0.25, 0.125)])
     assert (found.start, found.planning.step) == ((1.0, 2.0, 0.0, 0.0, 0.0), 0.1)
     goal = found.goal
