@@ -25,6 +25,7 @@ from cbrrt_ompl.kinematics import (
     middle_heading,
     ramp,
     saturate,
+    stopping_time,
     unicycle_step,
     wrap_angle,
 )
@@ -558,7 +559,7 @@ def brake(
     scratch: NDArray[np.float64],
 ) -> tuple[int, tuple[float, float, float]]:
     """Brake to rest from a valid state: `EXTENDED` (free), `BLOCKED` or `ASK`, and the pose that FCL must decide."""
-    stopping_distance = abs(state[3]) * (0.5 * abs(state[3]) / model.limits.acceleration + model.dt)
+    stopping_distance = abs(state[3]) * (0.5 * stopping_time(state[3], state[4], model.limits) + model.dt)
     if certify(view, state[0], state[1]) > stopping_distance:
         return EXTENDED, (0.0, 0.0, 0.0)
     _, outcome, _, pose = roll_out(state, (0.0, 0.0, BRAKE), model, view, answers, answered, scratch)

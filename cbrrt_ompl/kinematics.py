@@ -67,6 +67,9 @@ def has_wheel_limits(limits: Limits) -> bool:
 INSIDE = 1.0 - 1e-15
 """Leaves room for the rounding of a product, so that a scaled command is within its limit and not scaled again."""
 
+WITHIN = 1.0 + 1e-12
+"""Rounding by which a command may be out of reach and be reached, as one that was computed to be just in reach."""
+
 
 @njit(cache=True)
 def saturate(v: float, omega: float, limits: Limits) -> tuple[float, float]:
@@ -86,6 +89,40 @@ def saturate(v: float, omega: float, limits: Limits) -> tuple[float, float]:
         return v, omega
     share = INSIDE * limits.wheel_speed / rim
     return v * share, omega * share
+
+
+@njit(cache=True)
+def pure_limits(limits: Limits) -> Limits:
+    """Limits that hold for driving straight on and for turning on the spot, those of the wheels included."""
+    if not has_wheel_limits(limits):
+        return limits
+    arm = 0.5 * limits.wheel_separation
+    v_top, omega_top = limits.wheel_speed, INSIDE * limits.wheel_speed / arm
+    return Limits(
+        max(limits.v_min, -v_top),
+        min(limits.v_max, v_top),
+        max(limits.omega_min, -omega_top),
+        min(limits.omega_max, omega_top),
+        min(limits.acceleration, limits.wheel_acceleration),
+        min(limits.angular_acceleration, limits.wheel_acceleration / arm),
+        limits.wheel_separation,
+        limits.wheel_speed,
+        limits.wheel_acceleration,
+    )
+
+
+@njit(cache=True)
+def joint_ramp_time(dv: float, domega: float, limits: Limits) -> float:
+    """Time in which both velocities change by (dv, domega) at once, [m/s, rad/s] to [s]."""
+    size, turn = abs(dv), abs(domega)
+    time = max(size / limits.acceleration, turn / limits.angular_acceleration)
+    return max(time, (size + 0.5 * limits.wheel_separation * turn) / limits.wheel_acceleration)
+
+
+@njit(cache=True)
+def stopping_time(v: float, omega: float, limits: Limits) -> float:
+    """Time in which a robot that brakes no longer drives, though it may still turn [s]."""
+    return joint_ramp_time(v, omega, limits) if has_wheel_limits(limits) else abs(v) / limits.acceleration
 
 
 @njit(cache=True)
@@ -112,10 +149,8 @@ def joint_ramp(
         The paper ramps v and omega independently of each other: :func:`ramp`, for robots without wheel limits.
     """
     dv, domega = v_command - v, omega_command - omega
-    size, turn = abs(dv), abs(domega)
-    needed = max(size / limits.acceleration, turn / limits.angular_acceleration)
-    needed = max(needed, (size + 0.5 * limits.wheel_separation * turn) / limits.wheel_acceleration)
-    if needed <= dt:
+    needed = joint_ramp_time(dv, domega, limits)
+    if needed <= dt * WITHIN:
         return v_command, omega_command
     share = dt / needed
     return (

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from cbrrt_ompl import load_scenario, make_setup, plan, verify
 from cbrrt_ompl.extension import OPEN_LOOP, STEERING, pack_model
-from cbrrt_ompl.kinematics import dynamic_step
+from cbrrt_ompl.kinematics import dynamic_step, saturate
 from cbrrt_ompl.manoeuvres import BRAKE, FORWARD, REVERSE, has_ended, most_steps, next_velocity
 from cbrrt_ompl.obstacles import Bounds, Box
 from cbrrt_ompl.ompl_plugin.binding import ob
@@ -31,8 +31,10 @@ PARKED = Goal(2.0, 1.0, tolerance=0.01, theta=-2.0, heading_tolerance=0.01, spee
 
 coordinates = st.floats(-9.0, 9.0)
 headings = st.floats(-math.pi, math.pi, exclude_max=True)
+wheels = st.sampled_from([(), (0.4, 0.5), (0.3, math.inf, 0.6), (0.6, 0.8, 1.0)])
 robots = st.builds(
-    lambda *limits: Robot(limits=Limits(*limits)),
+    lambda wheel_limits, *limits: Robot(limits=Limits(*limits, *wheel_limits)),
+    wheels,
     st.sampled_from([0.0, -0.5]),
     st.floats(0.05, 3.0),
     st.sampled_from([0.0, -0.7, -2.0]),
@@ -97,7 +99,8 @@ class TestFinalApproach:
             np.array([robot.limits.v_min, robot.limits.omega_min]),
             np.array([robot.limits.v_max, robot.limits.omega_max]),
         )
-        start = State(x, y, theta, *(low + np.array([v, omega]) * (high - low)).tolist())
+        velocity = low + np.array([v, omega]) * (high - low)
+        start = State(x, y, theta, *saturate(*velocity.tolist(), robot.limits))
         goal = replace(PARKED, x=0.0, y=0.0, theta=goal_theta)
         for manoeuvre in (FORWARD, REVERSE) if robot.limits.v_min < 0.0 else (FORWARD,):
             way = drive(start, manoeuvre, robot, goal)
