@@ -1,18 +1,20 @@
 """Verification of trajectories, by code that shares nothing with the planners.
 
-The velocities are computed again from the commands and the limits, the poses from the velocities, the collisions by
-FCL; the planners' kernels and the clearance map have no part in it.
+The velocities are computed again from the commands and the limits, the poses from the velocities by an integrator of
+SciPy's, the collisions by FCL; the planners' kernels and the clearance map have no part in it. A motion is proven free
+between the states that FCL is asked about: whatever moves by less than its clearance touches nothing.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.integrate import solve_ivp
 
 from cbrrt_ompl.errors import Problem, SettingsError
 from cbrrt_ompl.settings import State
@@ -21,15 +23,28 @@ from cbrrt_ompl.trajectory import Trajectory, displacement, wrapped
 if TYPE_CHECKING:
     from cbrrt_ompl.robot import Limits
     from cbrrt_ompl.scenario import Scenario
+    from cbrrt_ompl.world import CollisionChecker
 
 START_TOLERANCE = 1e-6
 """Largest deviation of the first row from the scenario's start, in each value [m, rad, m/s, rad/s]."""
 
-CHECKS_PER_STEP = 4
-"""States between two rows, or in a planning step where the rows are farther apart, that FCL is asked about."""
+RESOLUTION = 1e-4
+"""Intervals in which no point of the footprint moves more than this need no proof: their ends are to be free [m]."""
 
-MAX_CHECKS_PER_STEP = 4000
-"""States between two rows beyond which the rows are too far apart to be checked."""
+PROVEN_SHARE = 0.95
+"""The bound on the clearance is pursued until it is this share of the smallest clearance found."""
+
+MAX_CHECKS = 200_000
+"""States of a motion that FCL is asked about at most: some seconds."""
+
+LONGEST_TURN = 2.0 * math.pi
+"""Largest turn from one row to the next that can be checked [rad]: a stored heading says nothing of full turns."""
+
+LONGEST_WAY = 1e6
+"""Largest way from one row to the next that can be checked [m]."""
+
+RELATIVE_ERROR, ABSOLUTE_ERROR = 1e-10, 1e-12
+"""What SciPy's integrator keeps its error below, relative and absolute [m, rad]."""
 
 KINEMATIC_HINT = (
     "the velocities jump exactly to their commands, as those of a kinematic planner (s-rrt) do: "
@@ -64,9 +79,17 @@ class Verification:
     violations: tuple[Violation, ...]
     """Every broken condition, in the order of the checks."""
     smallest_clearance: float
-    """Smallest distance of the footprint from obstacles and walls at the rows, by FCL [m]."""
+    """Smallest distance of the footprint from obstacles and walls that was found, by FCL [m]."""
     smallest_clearance_time: float
-    """When it is smallest [s]."""
+    """When it was found [s]."""
+    smallest_clearance_pose: tuple[float, float, float]
+    """Where it was found: (x, y, theta), [m, m, rad]."""
+    clearance_bound: float
+    """What the clearance is proven not to fall below at any time [m]: 0 or less where a stretch is not proven free."""
+    resolution: float
+    """Intervals in which no point of the footprint moves more than this were accepted for their free ends [m]."""
+    unproven: int
+    """How many intervals were accepted for their free ends alone."""
     tolerance: float
     """Largest deviation from the motion computed again that was accepted [m, rad, m/s, rad/s]."""
     kinematic: bool
@@ -103,130 +126,109 @@ class Verification:
             *(["  velocities and commands within the limits"] if self.kinematic else []),
             f"  {accelerations}",
             f"  motion integrated again from the commands, to {self.tolerance:g} (m, rad, m/s, rad/s) at every row",
-            f"  collisions by FCL at {self.checks} states, stored and integrated again, {CHECKS_PER_STEP} a step",
-            f"smallest clearance: {self.smallest_clearance:.4g} m at t = {self.smallest_clearance_time:.6g} s",
+            "  no collision of the motion, stored and integrated again, at any time: by the clearance that FCL finds",
+            f"  at {self.checks} states and the way between them; "
+            f"intervals of at most {self.resolution:g} m accepted for their free ends: {self.unproven}",
+            f"smallest clearance: {self.smallest_clearance:.4g} m at t = {self.smallest_clearance_time:.6g} s, "
+            f"at {_place(self.smallest_clearance_pose)}; proven not to fall below {self.clearance_bound:.4g} m",
         ]
         return "\n".join(lines)
 
 
-def verify(trajectory: Trajectory, scenario: Scenario, *, tolerance: float = 1e-3) -> Verification:
+def verify(
+    trajectory: Trajectory, scenario: Scenario, *, tolerance: float = 1e-3, resolution: float = RESOLUTION
+) -> Verification:
     """Check a trajectory against everything that its scenario asks for.
 
     From the first row on, the motion is computed again from the commands and the limits: the velocities ramp towards
-    the command at the limits of acceleration (kinematic: jump to it), heading and position follow in closed form and
-    by quadrature. Every row has to agree with that; start, goal, limits and collisions are checked besides.
+    the command at the limits of acceleration (kinematic: jump to it), and SciPy integrates heading and position. Every
+    row has to agree with that; start, goal and limits are checked besides.
+
+    Both motions, stored and computed again, have to be free of collision at any time. FCL's clearances at two times
+    prove all between them, if together they exceed a bound on the way of any point of the footprint; else the interval
+    is halved, until no point moves more than ``resolution`` in it.
 
     Args:
         trajectory: what is to be checked.
         scenario: world, robot, start and goal.
         tolerance: largest deviation of a row from the motion computed again: of the position [m], the heading [rad],
             v [m/s] and omega [rad/s].
+        resolution: way of any point of the footprint down to which an interval is proven [m]; a shorter one is accepted
+            if its ends are free.
 
     Returns:
         The violations found, and the smallest clearance.
 
     Raises:
-        SettingsError: if the tolerance is no number above 0.
+        SettingsError: if the tolerance or the resolution is no number above 0.
     """
-    if not (math.isfinite(tolerance) and tolerance > 0.0):
-        raise SettingsError(Problem("tolerance", tolerance, "a number above 0"))
+    for name, value in (("tolerance", tolerance), ("resolution", resolution)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise SettingsError(Problem(name, value, "a number above 0"))
+    footprint = scenario.robot.footprint
+    checker = scenario.world.checker(footprint)
+    reach = 0.0 if footprint.is_round else footprint.circumscribed_radius
     limits = scenario.robot.limits
     with np.errstate(all="ignore"):  # absurd numbers overflow, and are reported as violations
-        grid = _Grid.of(trajectory, scenario.planning.step)
-        again = _integrate_again(trajectory, limits, grid)
+        velocities = _velocities_again(trajectory, limits)
+        states = _integrate_again(trajectory, velocities)
         accelerations = [] if trajectory.kinematic else list(_acceleration_violations(trajectory, limits))
         if limits.has_wheel_limits and not trajectory.kinematic:
             accelerations += _wheel_acceleration_violations(trajectory, limits)
-        collisions, checks = _collisions(trajectory, again, scenario, grid)
+        motions = {
+            "stored motion": _Motion.through(trajectory.t, trajectory.poses, trajectory.step_velocities, reach),
+            "motion computed again": _Motion.through(trajectory.t, states[:, :3], velocities, reach),
+        }
+        sweeps = {name: _sweep(motion, checker, resolution) for name, motion in motions.items()}
         violations = (
             *_start_violations(trajectory, scenario),
             *_limit_violations(trajectory, limits),
             *_wheel_speed_violations(trajectory, limits),
             *accelerations,
-            *_motion_violations(trajectory, again, tolerance),
-            *collisions,
+            *_motion_violations(trajectory, states, tolerance),
+            *_collision_violations(sweeps),
+            *_sampling_violations(trajectory, motions.values(), sweeps.values()),
             *_goal_violations(trajectory, scenario),
         )
-    checker = scenario.world.checker(scenario.robot.footprint)
-    clearances = [checker.clearance(*pose) for pose in trajectory.poses.tolist()]
-    nearest = int(np.argmin(clearances))
+    nearest = min(sweeps.values(), key=lambda sweep: sweep.smallest_margin)
     return Verification(
         violations=violations,
-        smallest_clearance=clearances[nearest],
-        smallest_clearance_time=float(trajectory.t[nearest]),
+        smallest_clearance=checker.clearance(*nearest.pose),
+        smallest_clearance_time=nearest.time,
+        smallest_clearance_pose=nearest.pose,
+        clearance_bound=min(sweep.bound for sweep in sweeps.values()),
+        resolution=resolution,
+        unproven=sum(sweep.unproven for sweep in sweeps.values()),
         tolerance=tolerance,
         kinematic=trajectory.kinematic,
         rows=len(trajectory),
         duration=trajectory.duration,
-        checks=checks,
+        checks=sum(sweep.checks for sweep in sweeps.values()),
         hint=KINEMATIC_HINT if accelerations and _jumps_to_commands(trajectory) else "",
     )
 
 
-@dataclass(frozen=True)
-class _Grid:
-    """Parts into which the steps between the rows are cut, m in all."""
+def _velocities_again(trajectory: Trajectory, limits: Limits) -> NDArray[np.float64]:
+    """The velocities that follow from the first row, the commands and the limits.
 
-    row: NDArray[np.int64]
-    """Row before each part, shape (m,)."""
-    begin: NDArray[np.float64]
-    """Where each part begins, as a share of its step, shape (m,)."""
-    end: NDArray[np.float64]
-    """Where each part ends, as a share of its step, shape (m,)."""
-    last: NDArray[np.int64]
-    """Last part of each step, shape (n - 1,)."""
-    times: NDArray[np.float64]
-    """When each part ends, shape (m,) [s]."""
-    too_long: NDArray[np.int64]
-    """Steps that would need more than MAX_CHECKS_PER_STEP parts."""
-
-    @classmethod
-    def of(cls, trajectory: Trajectory, planning_step: float) -> _Grid:
-        """Cut every step into four, and steps that are longer than the planning step into more."""
-        steps = np.diff(trajectory.t)
-        wanted = CHECKS_PER_STEP * np.ceil(steps / planning_step * (1.0 - 1e-6))
-        parts = np.clip(wanted, CHECKS_PER_STEP, MAX_CHECKS_PER_STEP).astype(np.int64)
-        row = np.repeat(np.arange(len(steps)), parts)
-        last = np.cumsum(parts) - 1
-        part = np.arange(len(row)) - (last - parts + 1)[row]
-        end = (part + 1) / parts[row]
-        times = trajectory.t[:-1][row] + steps[row] * end
-        return cls(row, part / parts[row], end, last, times, np.flatnonzero(wanted > MAX_CHECKS_PER_STEP))
-
-
-@dataclass(frozen=True)
-class _Motion:
-    """A motion computed again."""
-
-    states: NDArray[np.float64]
-    """States at the rows, the heading not wrapped, shape (n, 5)."""
-    poses: NDArray[np.float64]
-    """Poses at the ends of the grid's parts, shape (m, 3)."""
-
-
-def _integrate_again(trajectory: Trajectory, limits: Limits, grid: _Grid) -> _Motion:
-    """The motion that follows from the first row, the commands and the limits."""
+    Returns:
+        v, v at the end, omega, omega at the end of each step, shape (4, n - 1) [m/s, rad/s].
+    """
     steps = np.diff(trajectory.t)
-    columns = []
+    if limits.has_wheel_limits and not trajectory.kinematic:
+        v, omega = _ramp_together(trajectory, limits)
+        return np.array([v[:-1], v[1:], omega[:-1], omega[1:]])
+    rows: list[NDArray[np.float64]] = []
     for start, commands, most in (
         (trajectory.v[0], trajectory.v_command[:-1], limits.acceleration * steps),
         (trajectory.omega[0], trajectory.omega_command[:-1], limits.angular_acceleration * steps),
     ):
-        ends = commands if trajectory.kinematic else _ramp(start, commands, most)
-        columns.append(np.concatenate([[start], ends]))
-    v, omega = columns
-    if limits.has_wheel_limits and not trajectory.kinematic:
-        v, omega = _ramp_together(trajectory, limits)
-    v0, w0 = (v[1:], omega[1:]) if trajectory.kinematic else (v[:-1], omega[:-1])
-    velocities = np.array([v0, v[1:], w0, omega[1:]])  # (4, n - 1)
-    theta = trajectory.theta[0] + np.concatenate([[0.0], np.cumsum(0.5 * (w0 + omega[1:]) * steps)])
-    offsets = _offsets(theta[:-1], velocities, steps, grid)  # (m, 3)
-    x, y = (
-        start + np.concatenate([[0.0], np.cumsum(offsets[grid.last, axis])])
-        for axis, start in enumerate((trajectory.x[0], trajectory.y[0]))
-    )
-    states = np.column_stack([x, y, theta, v, omega])
-    return _Motion(states, states[grid.row, :3] + offsets)
+        if trajectory.kinematic:
+            rows += [commands, commands]
+        else:
+            ends = _ramp(start, commands, most)
+            rows += [np.concatenate([[start], ends])[:-1], ends]
+    return np.array(rows)
 
 
 def _ramp(start: float, commands: NDArray[np.float64], most: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -261,24 +263,208 @@ def _wheel_speeds(v: ArrayLike, omega: ArrayLike, limits: Limits) -> tuple[Any, 
     return np.subtract(v, turn), np.add(v, turn)
 
 
-def _offsets(
-    theta: NDArray[np.float64], velocities: NDArray[np.float64], steps: NDArray[np.float64], grid: _Grid
-) -> NDArray[np.float64]:
-    """Change of pose from the beginning of its step to the end of each part, shape (m, 3).
+def _checkable(velocities: NDArray[np.float64], steps: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether each step is short enough to be integrated and checked, shape (n - 1,)."""
+    v0, v1, w0, w1 = np.abs(velocities)
+    return (np.maximum(v0, v1) * steps <= LONGEST_WAY) & (np.maximum(w0, w1) * steps <= LONGEST_TURN)
+
+
+def _integrate_again(trajectory: Trajectory, velocities: NDArray[np.float64]) -> NDArray[np.float64]:
+    """States at the rows of the motion that follows from its first pose and the velocities.
+
+    Within a step the velocities are linear in time, so that the right-hand side is smooth. All steps are integrated at
+    once, each in the frame of its own beginning, and then put end to end.
 
     Args:
-        theta: heading at the beginning of each step, shape (n - 1,) [rad].
-        velocities: v, v at the end, omega, omega at the end of each step, shape (4, n - 1) [m/s, rad/s].
-        steps: durations, shape (n - 1,) [s].
-        grid: the parts.
+        trajectory: start and times.
+        velocities: see :func:`_velocities_again`; steps that are not checkable are left out.
+
+    Returns:
+        Rows of (x, y, theta, v, omega), the heading not wrapped, shape (n, 5).
     """
-    v0, v1, w0, w1 = velocities[:, grid.row]
-    dt, a, b = steps[grid.row], grid.begin, grid.end
-    heading = theta[grid.row] + dt * a * (w0 + 0.5 * (w1 - w0) * a)
-    v_a, v_b, w_a, w_b = (x0 + (x1 - x0) * share for x0, x1 in ((v0, v1), (w0, w1)) for share in (a, b))
-    total = np.cumsum(displacement(heading, v_a, v_b, w_a, w_b, dt * (b - a)), axis=0)
-    before = np.concatenate([np.zeros((1, 3)), total[grid.last]])[:-1]  # (n - 1, 3)
-    return total - before[grid.row]
+    steps = np.diff(trajectory.t)
+    count = len(steps)
+    v0, v1, w0, w1 = np.where(_checkable(velocities, steps), velocities, 0.0)
+
+    def rates(share: float, pose: NDArray[np.float64]) -> NDArray[np.float64]:
+        heading = pose[2 * count :]
+        way = steps * (v0 + (v1 - v0) * share)
+        return np.concatenate([way * np.cos(heading), way * np.sin(heading), steps * (w0 + (w1 - w0) * share)])
+
+    begin = np.zeros(3 * count)
+    found = solve_ivp(rates, (0.0, 1.0), begin, "DOP853", (1.0,), rtol=RELATIVE_ERROR, atol=ABSOLUTE_ERROR)
+    dx, dy, turn = found.y.reshape(3, count)
+    theta = trajectory.theta[0] + np.concatenate([[0.0], np.cumsum(turn)])
+    c, s = np.cos(theta[:-1]), np.sin(theta[:-1])
+    x = trajectory.x[0] + np.concatenate([[0.0], np.cumsum(c * dx - s * dy)])
+    y = trajectory.y[0] + np.concatenate([[0.0], np.cumsum(s * dx + c * dy)])
+    v, omega = (
+        np.concatenate([[trajectory.v[0]], velocities[1]]),
+        np.concatenate([[trajectory.omega[0]], velocities[3]]),
+    )
+    return np.column_stack([x, y, theta, v, omega])
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """A motion through n poses; places on it are counted in rows, 2.5 is halfway through the step from row 2.
+
+    Each step follows its velocities, linear in time; what they miss the next pose by is added evenly along the step.
+    """
+
+    times: NDArray[np.float64]
+    """When the robot is at each pose, shape (n,) [s]."""
+    poses: NDArray[np.float64]
+    """The poses, shape (n, 3) [m, m, rad]."""
+    velocities: NDArray[np.float64]
+    """v, v at the end, omega, omega at the end of each step, shape (4, n - 1) [m/s, rad/s]."""
+    gaps: NDArray[np.float64]
+    """What the velocities miss the next pose by, shape (n - 1, 3) [m, m, rad]."""
+    gap_ways: NDArray[np.float64]
+    """How far that moves a point of the footprint at most, shape (n - 1,) [m]."""
+    reach: float
+    """Distance from the origin that turning moves the footprint at [m]: 0 where turning makes no difference."""
+    ways: NDArray[np.float64]
+    """Bound on the way of any point of the footprint up to each pose, shape (n,) [m]."""
+    left_out: NDArray[np.bool_]
+    """Steps that are too long to be checked, shape (n - 1,)."""
+
+    @classmethod
+    def through(
+        cls, times: NDArray[np.float64], poses: NDArray[np.float64], velocities: NDArray[np.float64], reach: float
+    ) -> _Motion:
+        """The motion through poses by the velocities of the steps between them."""
+        steps = np.diff(times)
+        v0, v1, w0, w1 = velocities
+        gaps = np.diff(poses, axis=0) - displacement(poses[:-1, 2], v0, v1, w0, w1, steps)
+        gaps[:, 2] = wrapped(gaps[:, 2])
+        gap_ways = np.hypot(gaps[:, 0], gaps[:, 1]) + reach * np.abs(gaps[:, 2])
+        checkable = _checkable(velocities, steps) & (gap_ways <= LONGEST_WAY)
+        velocities = np.where(checkable, velocities, 0.0)
+        gaps, gap_ways = np.where(checkable[:, None], gaps, 0.0), np.where(checkable, gap_ways, 0.0)
+        v0, v1, w0, w1 = np.abs(velocities)
+        ways = 0.5 * steps * (v0 + v1 + reach * (w0 + w1)) + gap_ways
+        ways = np.concatenate([[0.0], np.cumsum(ways)])
+        return cls(times, poses, velocities, gaps, gap_ways, reach, ways, ~checkable)
+
+    def _split(self, places: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Row before each place, and the share of the step from there that is behind it."""
+        rows = np.minimum(places.astype(np.int64), len(self.times) - 2)
+        return rows, places - rows
+
+    def times_at(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """When the robot is at each place, shape (m,) [s]."""
+        return np.interp(places, np.arange(len(self.times)), self.times)
+
+    def poses_at(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Poses at places, the heading not wrapped, shape (m, 3)."""
+        if len(self.times) == 1:
+            return np.repeat(self.poses, len(places), axis=0)
+        rows, share = self._split(places)
+        v0, v1, w0, w1 = self.velocities[:, rows]
+        v, omega = v0 + (v1 - v0) * share, w0 + (w1 - w0) * share
+        elapsed = share * (self.times[rows + 1] - self.times[rows])
+        moved = displacement(self.poses[rows, 2], v0, v, w0, omega, elapsed) + share[:, None] * self.gaps[rows]
+        return self.poses[rows] + moved
+
+    def ways_between(self, begin: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Bound on the way of any point of the footprint in each interval: whole rows or a part of one step [m].
+
+        The speeds are convex functions of the time within a step, so their mean at two times is not below that between.
+        """
+        rows, a = self._split(begin)
+        b = end - rows
+        v0, v1, w0, w1 = self.velocities[:, rows]
+        speeds = [
+            np.abs(v0 + (v1 - v0) * share) + self.reach * np.abs(w0 + (w1 - w0) * share) for share in (a, b)
+        ]  # (2, m)
+        steps = self.times[rows + 1] - self.times[rows]
+        parts = (b - a) * (0.5 * steps * (speeds[0] + speeds[1]) + self.gap_ways[rows])
+        whole = self.ways[end.astype(np.int64)] - self.ways[begin.astype(np.int64)]
+        return np.where(end - begin > 1.0, whole, parts)
+
+
+@dataclass(frozen=True)
+class _Sweep:
+    """What became of a motion that was swept for collisions."""
+
+    smallest_margin: float
+    """Smallest margin found [m]."""
+    time: float
+    """When [s]."""
+    pose: tuple[float, float, float]
+    """Where, the heading wrapped [m, m, rad]."""
+    bound: float
+    """What no margin is below [m]."""
+    checks: int
+    """States that FCL was asked about."""
+    unproven: int
+    """Intervals accepted for their free ends alone."""
+    hit_times: NDArray[np.float64]
+    """When a collision was found, shape (k,) [s]."""
+    hit_poses: NDArray[np.float64]
+    """Where, shape (k, 3)."""
+    given_up_at: float
+    """Time from which on the checks did not suffice [s]; infinite where they did."""
+
+
+def _sweep(motion: _Motion, checker: CollisionChecker, resolution: float) -> _Sweep:
+    """Prove a motion free, an interval at a time, or find where it is not.
+
+    An interval between two states with margins a and b, on which no point moves further than s, holds no state with a
+    margin below (a + b - s) / 2. Where this proves too little, the interval is halved.
+
+    Args:
+        motion: what is to be proven free.
+        checker: FCL's answers.
+        resolution: way of any point of the footprint at which halving ends [m].
+    """
+
+    def margins_at(places: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.array([checker.margin(*pose) for pose in motion.poses_at(places).tolist()])
+
+    ends = np.unique([0.0, len(motion.times) - 1.0])
+    asked, found = [ends], [margins_at(ends)]
+    begin, end = ends[:-1], ends[1:]
+    margin, margin_end = found[0][:-1], found[0][1:]
+    smallest, checks, unproven, given_up_at = float(found[0].min()), len(ends), 0, math.inf
+    bound = smallest
+    while len(begin):
+        ways = motion.ways_between(begin, end)
+        bounds = 0.5 * (margin + margin_end - ways)
+        hits, free = (margin <= 0.0) & (margin_end <= 0.0), (margin > 0.0) & (margin_end > 0.0)
+        short = ways <= resolution
+        settled = free & (bounds > 0.0) & (bounds >= PROVEN_SHARE * smallest) | short | hits & (end - begin <= 1.0)
+        bound = min(bound, float(bounds[settled].min(initial=math.inf)))
+        unproven += int(np.count_nonzero(settled & free & (bounds <= 0.0)))
+        begin, end, margin, margin_end = (values[~settled] for values in (begin, end, margin, margin_end))
+        checks += len(begin)
+        if checks > MAX_CHECKS:
+            bound, given_up_at = -math.inf, float(motion.times_at(begin).min())
+            break
+        middle = 0.5 * (begin + end)
+        middle = np.where(end - begin > 1.0, np.floor(middle), middle)
+        asked.append(middle)
+        found.append(margins_at(middle))
+        smallest = min(smallest, float(found[-1].min(initial=math.inf)))
+        begin, end = np.concatenate([begin, middle]), np.concatenate([middle, end])
+        margin, margin_end = np.concatenate([margin, found[-1]]), np.concatenate([found[-1], margin_end])
+    places, margins = np.concatenate(asked), np.concatenate(found)
+    order = np.argsort(places)
+    places, margins = places[order], margins[order]
+    nearest, hit = places[[np.argmin(margins)]], places[margins <= 0.0]
+    x, y, theta = motion.poses_at(nearest)[0].tolist()
+    return _Sweep(
+        smallest_margin=smallest,
+        time=float(motion.times_at(nearest)[0]),
+        pose=(x, y, float(wrapped(theta))),
+        bound=-math.inf if motion.left_out.any() else bound,
+        checks=len(places),
+        unproven=unproven,
+        hit_times=motion.times_at(hit),
+        hit_poses=motion.poses_at(hit),
+        given_up_at=given_up_at,
+    )
 
 
 def _violation(
@@ -402,9 +588,9 @@ def _wheel_acceleration_violations(trajectory: Trajectory, limits: Limits) -> It
         )
 
 
-def _motion_violations(trajectory: Trajectory, again: _Motion, tolerance: float) -> Iterator[Violation]:
+def _motion_violations(trajectory: Trajectory, states: NDArray[np.float64], tolerance: float) -> Iterator[Violation]:
     """Rows that differ from the motion computed again."""
-    error = trajectory.states - again.states  # (n, 5)
+    error = trajectory.states - states  # (n, 5)
     deviations = {
         "position": (np.hypot(error[:, 0], error[:, 1]), "m"),
         "heading": (wrapped(error[:, 2]), "rad"),
@@ -423,43 +609,44 @@ def _motion_violations(trajectory: Trajectory, again: _Motion, tolerance: float)
         )
 
 
-def _collisions(trajectory: Trajectory, again: _Motion, scenario: Scenario, grid: _Grid) -> tuple[list[Violation], int]:
-    """Collisions of the stored motion and of the one computed again, and the number of states asked about."""
-    offsets = _offsets(trajectory.theta[:-1], trajectory.step_velocities, np.diff(trajectory.t), grid)
-    stored = np.concatenate([trajectory.poses, trajectory.poses[grid.row] + offsets])
-    stored_times = np.concatenate([trajectory.t, grid.times])
-    integrated = np.concatenate([again.states[:1, :3], again.poses])
-    integrated_times = np.concatenate([trajectory.t[:1], grid.times])
-    collides = scenario.world.checker(scenario.robot.footprint).collides
-    found: list[Violation] = []
-    for text, poses, times in (
-        ("stored motion", stored, stored_times),
-        ("motion computed again", integrated, integrated_times),
-    ):
-        order = np.argsort(times, kind="stable")
-        poses, times = poses[order], times[order]
-        hits = np.array([collides(*pose) for pose in poses.tolist()])
-        if hits.any():
-            found.append(_collision(text, poses[hits], times[hits]))
-    for row in grid.too_long[:1]:
-        step, t = trajectory.t[row + 1] - trajectory.t[row], float(trajectory.t[row])
-        most = MAX_CHECKS_PER_STEP // CHECKS_PER_STEP * scenario.planning.step
-        message = f"sampling: the next row is {step:.6g} s away at t = {t:.6g} s, at most {most:.6g} s can be checked"
-        found.append(Violation("sampling", t, message, len(grid.too_long), float(trajectory.t[grid.too_long[-1]])))
-    return found, len(stored) + len(integrated)
+def _collision_violations(sweeps: Mapping[str, _Sweep]) -> Iterator[Violation]:
+    """Collisions of the motions, by their names."""
+    for name, sweep in sweeps.items():
+        times = sweep.hit_times
+        if not len(times):
+            continue
+        first, last = float(times[0]), float(times[-1])
+        place = _place(sweep.hit_poses[0])
+        message = f"collision: the {name} touches an obstacle or a wall at t = {first:.6g} s, at {place}"
+        if len(times) > 1:
+            message += f" ({len(times)} states, until t = {last:.6g} s)"
+        yield Violation("collision", first, message, len(times), last)
 
 
-def _collision(text: str, poses: NDArray[np.float64], times: NDArray[np.float64]) -> Violation:
-    """The violation for the states of a motion that collide."""
-    x, y, theta = poses[0]
-    first, last = float(times[0]), float(times[-1])
-    message = (
-        f"collision: the {text} touches an obstacle or a wall at t = {first:.6g} s, "
-        f"at ({x:.6g} m, {y:.6g} m, {float(wrapped(theta)):.6g} rad)"
-    )
-    if len(times) > 1:
-        message += f" ({len(times)} states, until t = {last:.6g} s)"
-    return Violation("collision", first, message, len(times), last)
+def _sampling_violations(
+    trajectory: Trajectory, motions: Iterable[_Motion], sweeps: Iterable[_Sweep]
+) -> Iterator[Violation]:
+    """What could not be checked."""
+    where = np.flatnonzero(np.any([motion.left_out for motion in motions], axis=0))
+    if len(where):
+        first, last = (float(trajectory.t[row]) for row in where[[0, -1]])
+        message = (
+            f"sampling: the next row is too far away to be checked at t = {first:.6g} s, "
+            f"at most {LONGEST_WAY:g} m and {LONGEST_TURN:.6g} rad from row to row"
+        )
+        if len(where) > 1:
+            message += f" ({len(where)} steps, until t = {last:.6g} s)"
+        yield Violation("sampling", first, message, len(where), last)
+    first = min(sweep.given_up_at for sweep in sweeps)
+    if first < math.inf:
+        message = f"sampling: {MAX_CHECKS} states do not prove the motion free from t = {first:.6g} s on"
+        yield Violation("sampling", first, message, last_time=float(trajectory.t[-1]))
+
+
+def _place(pose: Sequence[float] | NDArray[np.float64]) -> str:
+    """A pose in words."""
+    x, y, theta = pose
+    return f"({x:.6g} m, {y:.6g} m, {float(wrapped(theta)):.6g} rad)"
 
 
 def _jumps_to_commands(trajectory: Trajectory) -> bool:

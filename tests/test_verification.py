@@ -7,15 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from cbrrt_ompl.errors import SettingsError
-from cbrrt_ompl.obstacles import Bounds, Box
+from cbrrt_ompl.obstacles import Bounds, Box, Disc, OrientedBox, Polygon
 from cbrrt_ompl.robot import Footprint, Limits, Robot
 from cbrrt_ompl.scenario import Scenario
 from cbrrt_ompl.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.trajectory import Trajectory
-from cbrrt_ompl.verification import verify
+from cbrrt_ompl.verification import PROVEN_SHARE, RESOLUTION, verify
 from cbrrt_ompl.world import World
 
 DT = 0.05
@@ -185,15 +184,40 @@ def wall_at(trajectory: Trajectory, row: float, thickness: float) -> Box:
     return Box((x - thickness / 2, -5.0), (x + thickness / 2, 0.0))
 
 
-def test_a_wall_too_thin_for_the_rows_is_found_between_them(honest: Trajectory) -> None:
-    wall = wall_at(honest, 45.25, 0.002)
-    hits = [wall.min[0] <= x <= wall.max[0] for x in honest.x]
-    assert not any(hits)
-    violations = verify(honest, scenario_for(honest, (wall,))).violations
-    assert {violation.kind for violation in violations} == {"collision"}
-    assert [violation.time for violation in violations] == pytest.approx([45.25 * DT] * 2)
-    assert "the stored motion touches an obstacle or a wall at t = 2.2625 s" in violations[0].message
-    assert "the motion computed again touches" in violations[1].message
+@pytest.mark.parametrize("thickness", [0.002, 0.001, 0.0002])
+def test_a_thin_wall_between_the_rows_is_found_where_the_robot_enters_it(honest: Trajectory, thickness: float) -> None:
+    for row in np.arange(45.03, 46.0, 0.07):
+        wall = wall_at(honest, row, thickness)
+        hits = [wall.min[0] <= x <= wall.max[0] for x in honest.x]
+        assert not any(hits)
+        violations = verify(honest, scenario_for(honest, (wall,))).violations
+        assert [violation.kind for violation in violations] == ["collision"] * 2
+        for violation, name in zip(violations, ("stored motion", "motion computed again"), strict=True):
+            (x, _, _, v, _) = honest.at(violation.time)[0]
+            assert wall.min[0] - 1e-6 <= x <= wall.min[0] + RESOLUTION + 1e-6 * v
+            assert f"the {name} touches an obstacle or a wall at t = {violation.time:.6g} s, at (" in violation.message
+
+
+def straight(length: float, speed: float, angle: float = 0.0) -> Trajectory:
+    """Straight on from the origin at constant speed, as two rows."""
+    c, s = math.cos(angle), math.sin(angle)
+    t, v, zero = np.array([0.0, length / speed]), np.full(2, speed), np.zeros(2)
+    way = np.array([0.0, length])
+    return Trajectory(t, c * way, s * way, np.full(2, math.remainder(angle, math.tau)), v, zero, v, zero)
+
+
+@pytest.mark.parametrize("thickness", [1e-3, 2e-4])
+def test_a_thin_wall_is_found_in_any_direction(thickness: float) -> None:
+    rng = np.random.default_rng(5)
+    for angle, turn, distance in zip(
+        rng.uniform(-math.pi, math.pi, 60), rng.uniform(-1.4, 1.4, 60), rng.uniform(0.5, 2.5, 60), strict=True
+    ):
+        trajectory = straight(3.0, 1.0, angle)
+        center = (distance * math.cos(angle), distance * math.sin(angle))
+        wall = OrientedBox(center, (thickness, 1.0), angle + turn)
+        start = State(0.0, 0.0, angle, 1.0)
+        assert verify(trajectory, scenario_for(trajectory, start=start)).ok
+        assert kinds(trajectory, scenario_for(trajectory, (wall,), start=start)) == {"collision"}
 
 
 def test_rows_far_apart_hide_no_wall() -> None:
@@ -201,17 +225,75 @@ def test_rows_far_apart_hide_no_wall() -> None:
     limits = Limits(acceleration=1000.0)
     t = np.arange(4.0)
     ones, zero = np.ones(4), np.zeros(4)
-    straight = Trajectory(t, t - 2.0, zero, zero, ones, zero, ones, zero)
+    straight_on = Trajectory(t, t - 2.0, zero, zero, ones, zero, ones, zero)
     start, wall = State(-2.0, 0.0, 0.0, 1.0), Box((-1.45, -1.0), (-1.35, 1.0))
-    assert verify(straight, scenario_for(straight, limits=limits, start=start)).ok
-    assert kinds(straight, scenario_for(straight, (wall,), limits=limits, start=start)) == {"collision"}
+    assert verify(straight_on, scenario_for(straight_on, limits=limits, start=start)).ok
+    assert kinds(straight_on, scenario_for(straight_on, (wall,), limits=limits, start=start)) == {"collision"}
 
 
-def test_rows_too_far_apart_to_be_checked_are_a_violation() -> None:
-    t, zero = np.array([0.0, 1000.0]), np.zeros(2)
+def test_a_wait_is_proven_however_long_it_is() -> None:
+    t, zero = np.array([0.0, 1e6]), np.zeros(2)
     wait = Trajectory(t, zero, zero, zero, zero, zero, zero, zero)
-    (violation,) = verify(wait, scenario_for(wait, start=State(0.0, 0.0))).violations
-    assert violation.message == "sampling: the next row is 1000 s away at t = 0 s, at most 50 s can be checked"
+    assert verify(wait, scenario_for(wait, start=State(0.0, 0.0))).ok
+
+
+@pytest.mark.parametrize(("v", "omega"), [(0.0, 0.5), (1e5, 0.0), (1e300, 1e300)])
+def test_rows_too_far_apart_to_be_checked_are_a_violation(v: float, omega: float) -> None:
+    t, zero = np.array([0.0, 1000.0, 1001.0]), np.zeros(3)
+    jump = Trajectory(t, zero, zero, zero, zero, zero, np.full(3, v), np.full(3, omega), kinematic=True)
+    result = verify(jump, scenario_for(jump, start=State(0.0, 0.0)))
+    violation = next(violation for violation in result.violations if violation.kind == "sampling")
+    assert violation.message.startswith("sampling: the next row is too far away to be checked at t = 0 s, at most ")
+    assert violation.message.split(" at most ")[1].startswith("1e+06 m and 6.28319 rad from row to row")
+    assert result.clearance_bound == -math.inf
+
+
+def test_the_work_is_limited_and_what_it_did_not_reach_is_a_violation(
+    honest: Trajectory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cbrrt_ompl.verification.MAX_CHECKS", 20)
+    obstacle = Box((-3.0, -3.6), (-2.9, -3.5))
+    result = verify(honest, scenario_for(honest, (obstacle,)))
+    (violation,) = result.violations
+    assert violation.message.startswith("sampling: 20 states do not prove the motion free from t = ")
+    assert 0.0 < violation.time < 5.0
+    assert result.checks <= 40
+
+
+def test_driving_along_a_wall_at_less_than_the_resolution_is_accepted_and_said() -> None:
+    trajectory = straight(0.1, 0.5)
+    start, wall = State(0.0, 0.0, 0.0, 0.5), Box((-1.0, 2e-5), (2.0, 1.0))
+    result = verify(trajectory, scenario_for(trajectory, (wall,), start=start))
+    assert result.ok
+    assert result.unproven > 100 and -0.5 * RESOLUTION < result.clearance_bound < 0.0
+    text = f"intervals of at most 0.0001 m accepted for their free ends: {result.unproven}"
+    assert text in result.summary().splitlines()[-2]
+    finer = verify(trajectory, scenario_for(trajectory, (wall,), start=start), resolution=1e-5)
+    assert finer.unproven == 0 and 0.0 < finer.clearance_bound <= 2e-5
+
+
+def test_a_corner_between_two_rows_is_found_down_to_the_resolution() -> None:
+    trajectory = straight(2.0, 1.0)
+    start = State(0.0, 0.0, 0.0, 1.0)
+    for depth, expected in ((-1e-5, set()), (6e-5, {"collision"})):
+        diamond = Polygon([(0.7123, depth), (0.2, -0.5), (1.2, -0.5)])  # its tip reaches over the way by so much
+        assert kinds(trajectory, scenario_for(trajectory, (diamond,), start=start)) == expected
+
+
+@pytest.mark.parametrize("kinematic", [False, True])
+def test_the_motion_is_proven_where_the_robot_turns_and_its_corners_sweep(kinematic: bool) -> None:
+    """The clearance of a bar that turns on the spot, between rows at which it is free."""
+    t = np.array([0.0, 2.0])
+    zero, rate = np.zeros(2), np.full(2, 0.5)
+    turn = Trajectory(t, zero, zero, np.array([0.0, 1.0]), zero, rate, zero, rate, kinematic=kinematic)
+    bar, start = Footprint.polygon([(-0.05, -0.05), (1.0, -0.05), (1.0, 0.05), (-0.05, 0.05)]), State(0, 0, 0, 0, 0.5)
+    place = 0.98 * np.array([math.cos(0.5), math.sin(0.5)])
+    pin = Disc((float(place[0]), float(place[1])), 0.01)
+    assert verify(turn, scenario_for(turn, (), bar, start=start)).ok
+    (violation, _) = verify(turn, scenario_for(turn, (pin,), bar, start=start)).violations
+    assert violation.kind == "collision"
+    touches = 0.5 - math.asin(0.05 / 0.98) - math.asin(0.01 / 0.98)
+    assert violation.time == pytest.approx(touches / 0.5, abs=1e-3)
 
 
 def test_the_footprint_collides_where_its_centre_does_not(honest: Trajectory) -> None:
@@ -268,16 +350,38 @@ def test_dynamic_motion_verified_as_kinematic_fails(honest: Trajectory, scenario
     assert "motion" in kinds(replace(honest, kinematic=True), scenario)
 
 
-def test_the_smallest_clearance_is_the_distance_of_the_footprint_at_the_nearest_row(honest: Trajectory) -> None:
-    row = 100
-    x, y = float(honest.x[row]), float(honest.y[row])
-    obstacle = Box((x - 0.01, y - 1.0), (x + 0.01, y - 0.5))
-    result = verify(honest, scenario_for(honest, (obstacle,), Footprint.disc(0.2)))
-    distances: NDArray[np.float64] = np.hypot(
-        np.maximum(np.abs(honest.x - x) - 0.01, 0.0), np.maximum(honest.y - (y - 0.5), 0.0)
-    )
-    assert result.smallest_clearance == pytest.approx(distances.min() - 0.2, abs=1e-9)
-    assert result.smallest_clearance_time == honest.t[np.argmin(distances)]
+@pytest.mark.parametrize("footprint", [Footprint.disc(0.2), Footprint.polygon([(0.25, 0), (-0.1, 0.2), (-0.1, -0.2)])])
+def test_the_smallest_clearance_is_bounded_over_the_whole_motion(honest: Trajectory, footprint: Footprint) -> None:
+    obstacle = Disc((float(honest.x[100]), float(honest.y[100]) - 0.72), 0.1)
+    scenario = scenario_for(honest, (obstacle,), footprint)
+    result = verify(honest, scenario)
+    times = np.linspace(honest.t[0], honest.t[-1], 20_000)
+    clearances = np.array([scenario.world.clearance(footprint, state[:3]) for state in honest.at(times)])
+    assert result.ok
+    assert result.clearance_bound <= clearances.min() <= result.smallest_clearance + 1e-5
+    assert result.clearance_bound >= PROVEN_SHARE * (result.smallest_clearance - 1e-5)
+    assert scenario.world.clearance(footprint, result.smallest_clearance_pose) == result.smallest_clearance
+    there = honest.at(result.smallest_clearance_time)[0, :3]
+    assert there == pytest.approx(result.smallest_clearance_pose, abs=1e-4)
+
+
+def test_a_trajectory_in_open_space_takes_few_states(honest: Trajectory, scenario: Scenario) -> None:
+    assert verify(honest, scenario).checks < 60
+
+
+def test_the_motion_is_integrated_again_as_finely_as_scipy_can() -> None:
+    """A spiral whose velocities are linear in time, against a quadrature of its own."""
+    limits = Limits(-1.0, 1.0, -3.0, 3.0, 1.0, 3.0)
+    t, zero = np.array([0.0, 1.0]), np.zeros(2)
+    states = []
+    for parts in (200_000, 400_000):
+        middle = (np.arange(parts) + 0.5) / parts
+        heading, way = 1.5 * middle**2, middle / parts
+        states.append((np.sum(way * np.cos(heading)), np.sum(way * np.sin(heading)), 1.5))
+    x, y, theta = (np.array([0.0, (4.0 * fine - coarse) / 3.0]) for coarse, fine in zip(*states, strict=True))
+    spiral = Trajectory(t, x, y, theta, t, 3.0 * t, zero + 1.0, zero + 3.0)
+    scenario = scenario_for(spiral, limits=limits, start=State(0.0, 0.0))
+    assert verify(spiral, scenario, tolerance=1e-10).ok
 
 
 def test_absurd_numbers_are_violations_not_crashes(honest: Trajectory, scenario: Scenario) -> None:
@@ -286,10 +390,11 @@ def test_absurd_numbers_are_violations_not_crashes(honest: Trajectory, scenario:
         assert not verify(changed(honest, column, row, 1e308), scenario).ok
 
 
-@pytest.mark.parametrize("tolerance", [0.0, -1.0, math.nan, math.inf])
-def test_a_tolerance_that_is_none_is_refused(honest: Trajectory, scenario: Scenario, tolerance: float) -> None:
-    with pytest.raises(SettingsError, match="tolerance: got .*, expected a number above 0"):
-        verify(honest, scenario, tolerance=tolerance)
+@pytest.mark.parametrize("name", ["tolerance", "resolution"])
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
+def test_a_tolerance_that_is_none_is_refused(honest: Trajectory, scenario: Scenario, name: str, value: float) -> None:
+    with pytest.raises(SettingsError, match=f"{name}: got .*, expected a number above 0"):
+        verify(honest, scenario, **{name: value})
 
 
 def test_the_summary_says_what_was_checked_with_which_tolerance(honest: Trajectory, scenario: Scenario) -> None:
@@ -297,9 +402,9 @@ def test_the_summary_says_what_was_checked_with_which_tolerance(honest: Trajecto
     lines = result.summary().splitlines()
     assert lines[0] == "trajectory of 261 rows, 13 s: valid"
     assert any("integrated again from the commands, to 0.002 " in line for line in lines)
-    assert f"collisions by FCL at {result.checks} states" in result.summary()
-    assert result.checks == 261 + 260 * 4 + 1 + 260 * 4
+    assert f"at {result.checks} states and the way between them; " in result.summary()
     assert lines[-1].startswith(f"smallest clearance: {result.smallest_clearance:.4g} m at t = ")
+    assert lines[-1].endswith(f"; proven not to fall below {result.clearance_bound:.4g} m")
     assert "accelerations not checked" not in result.summary()
 
 
