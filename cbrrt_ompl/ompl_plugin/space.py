@@ -51,7 +51,8 @@ def make_control_space(space: Any, limits: Limits, has_manoeuvres: bool = False)
         has_manoeuvres: whether a third number, from 0 to 1 and without meaning, makes room for the marks of
             :mod:`cbrrt_ompl.manoeuvres`, which are outside of that range.
     """
-    low, high = (limits.v_min, limits.omega_min), (limits.v_max, limits.omega_max)
+    low: tuple[float, ...] = (limits.v_min, limits.omega_min)
+    high: tuple[float, ...] = (limits.v_max, limits.omega_max)
     if has_manoeuvres:
         low, high = (*low, 0.0), (*high, 1.0)
     controls = oc.RealVectorControlSpace(space, len(low))
