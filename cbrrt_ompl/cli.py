@@ -1,4 +1,4 @@
-"""The command line: ``cbrrt plan | verify | show | planners | bench | report | demo``.
+"""The command line: ``cbrrt plan | verify | show | planners | bench | report | demo | completion``.
 
 Exit codes: 0 done, 1 not solved or not verified, 2 bad input, 130 interrupted. Modules that take long to import are
 imported where they are used, so that ``cbrrt --help`` answers at once.
@@ -11,25 +11,42 @@ import json
 import math
 import os
 import sys
+import textwrap
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
 from cbrrt_ompl.errors import CbrrtError, InputError, Problem
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from cbrrt_ompl.benchmark.report import Report
+    from cbrrt_ompl.demo import DemoRun
     from cbrrt_ompl.planning import PlanResult
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED, BROKEN_PIPE = 0, 1, 2, 130, 141
 TRAJECTORY_SUFFIXES = (".csv", ".npz", ".json")
 FIGURE_SUFFIXES = (".png", ".pdf", ".svg")
 DATABASE_SUFFIXES = (".db", ".sqlite", ".sqlite3")
+SHELLS = ("bash", "zsh", "tcsh")
+LINE_WIDTH = 80
+SCENARIO_HELP = "scenario file (YAML), or the name of one that comes along, as paper_case1"
+GREEN, RED = "32", "31"
+
+EXAMPLES = """\
+examples:
+  cbrrt plan paper_case1 --seed 1 --figure case1.png   a scene of the paper
+  cbrrt plan depot.yaml --planner cb-rrt-robust --trajectory depot.csv
+  cbrrt verify depot.csv depot.yaml                    check it by other code
+  cbrrt bench maze office --runs 20 --database bench.db --log-dir logs
+  cbrrt report bench.db --output report                tables and charts
+
+'cbrrt COMMAND --help' explains a command."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -60,7 +77,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 def build_parser() -> argparse.ArgumentParser:
     """The grammar of the command line."""
     parser = _Parser(
-        prog="cbrrt", description="Plan trajectories for two-wheeled robots with CB-RRT and S-RRT in OMPL."
+        prog="cbrrt",
+        description="Plan trajectories for two-wheeled robots with CB-RRT and S-RRT in OMPL.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action=_Version, help="print the version and exit")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
@@ -71,13 +91,14 @@ def build_parser() -> argparse.ArgumentParser:
     _add_bench(commands)
     _add_report(commands)
     _add_demo(commands)
+    _add_completion(commands)
     return parser
 
 
 def _add_plan(commands: Any) -> None:
-    example = "cbrrt plan scenarios/paper_case1.yaml --seed 1 --trajectory case1.csv --figure case1.png"
+    example = "cbrrt plan paper_case1 --seed 1 --trajectory case1.csv --figure case1.png"
     parser = _add_command(commands, "plan", _plan, "plan a trajectory through a scenario", example)
-    parser.add_argument("scenario", type=Path, metavar="SCENARIO", help="scenario file (YAML)")
+    parser.add_argument("scenario", type=Path, metavar="SCENARIO", help=SCENARIO_HELP)
     parser.add_argument("--planner", default="cb-rrt", metavar="NAME", help="see 'cbrrt planners' (default: cb-rrt)")
     parser.add_argument("--seed", type=_seed, metavar="N", help="seed of the random numbers (default: a new one)")
     parser.add_argument(
@@ -85,37 +106,38 @@ def _add_plan(commands: Any) -> None:
     )
     parser.add_argument("--trajectory", type=Path, metavar="FILE", help="write the trajectory: .csv, .npz or .json")
     parser.add_argument("--figure", type=Path, metavar="FILE", help="draw scene, tree and path: .png, .pdf or .svg")
-    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+    _add_json(parser)
 
 
 def _add_verify(commands: Any) -> None:
-    example = "cbrrt verify case1.csv scenarios/paper_case1.yaml"
+    example = "cbrrt verify case1.csv paper_case1"
     parser = _add_command(commands, "verify", _verify, "check a trajectory against a scenario", example)
     parser.add_argument("trajectory", type=Path, metavar="TRAJECTORY", help="trajectory file: .csv, .npz or .json")
-    parser.add_argument("scenario", type=Path, metavar="SCENARIO", help="scenario file (YAML)")
+    parser.add_argument("scenario", type=Path, metavar="SCENARIO", help=SCENARIO_HELP)
     parser.add_argument("--kinematic", action="store_true", help="let velocities jump, as those of s-rrt do")
+    _add_json(parser)
 
 
 def _add_show(commands: Any) -> None:
-    example = "cbrrt show scenarios/paper_case1.yaml --trajectory case1.csv --figure case1.png"
+    example = "cbrrt show paper_case1 --trajectory case1.csv --figure case1.png"
     parser = _add_command(commands, "show", _show, "draw a scenario, and a trajectory in it", example)
-    parser.add_argument("scenario", type=Path, metavar="SCENARIO", help="scenario file (YAML)")
+    parser.add_argument("scenario", type=Path, metavar="SCENARIO", help=SCENARIO_HELP)
     parser.add_argument("--trajectory", type=Path, metavar="FILE", help="draw this trajectory too")
     parser.add_argument("--figure", type=Path, metavar="FILE", help="write .png, .pdf or .svg instead of a window")
 
 
 def _add_planners(commands: Any) -> None:
-    _add_command(commands, "planners", _planners, "list the planners", "cbrrt planners")
+    _add_json(_add_command(commands, "planners", _planners, "list the planners", "cbrrt planners"))
 
 
 def _add_bench(commands: Any) -> None:
     example = (
-        "cbrrt bench scenarios/paper_case1.yaml scenarios/maze.yaml --planner cb-rrt s-rrt rrt --runs 20 "
-        "--time-limit 2 --database bench.db --log-dir logs"
+        "cbrrt bench paper_case1 maze --planner cb-rrt s-rrt rrt --runs 20 \\\n"
+        "      --time-limit 2 --database bench.db --log-dir logs"
     )
     summary = "run planners in scenarios many times, in OMPL's Benchmark"
     parser = _add_command(commands, "bench", _bench, summary, example)
-    parser.add_argument("scenarios", type=Path, nargs="+", metavar="SCENARIO", help="scenario files (YAML)")
+    parser.add_argument("scenarios", type=Path, nargs="+", metavar="SCENARIO", help=SCENARIO_HELP)
     parser.add_argument(
         "--planner", nargs="+", action="extend", metavar="NAME", help="see 'cbrrt planners' (default: all of them)"
     )
@@ -136,6 +158,7 @@ def _add_bench(commands: Any) -> None:
         "--scheduler", metavar="ADDRESS",
         help="run on the workers of this dask.distributed scheduler; 'local' makes a cluster of J workers",
     )  # fmt: skip
+    _add_json(parser)
 
 
 def _add_report(commands: Any) -> None:
@@ -148,6 +171,7 @@ def _add_report(commands: Any) -> None:
     parser.add_argument(
         "--reference", metavar="NAME", help="planner to compare the others with (default: cb-rrt, if it is there)"
     )
+    _add_json(parser)
 
 
 def _add_demo(commands: Any) -> None:
@@ -157,6 +181,16 @@ def _add_demo(commands: Any) -> None:
         "--output", type=Path, default=Path("demo"), metavar="DIR", help="folder for figures, trajectories and table"
     )
     parser.add_argument("--seed", type=_seed, default=1, metavar="N", help="seed of every plan (default: 1)")
+
+
+def _add_completion(commands: Any) -> None:
+    summary = "print the script that makes a shell complete cbrrt's arguments"
+    parser = _add_command(commands, "completion", _completion, summary, "cbrrt completion bash")
+    parser.add_argument("shell", choices=SHELLS, metavar="SHELL", help=", ".join(SHELLS))
+
+
+def _add_json(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", action="store_true", help="print the result as JSON, in SI units")
 
 
 def _plan(arguments: argparse.Namespace) -> int:
@@ -180,7 +214,7 @@ def _plan(arguments: argparse.Namespace) -> int:
 
         draw_plan(result, scenario).savefig(arguments.figure)
     if arguments.json:
-        print(json.dumps(_json_result(scenario.name, result, written, arguments.figure), indent=2))
+        _print_json(_json_result(scenario.name, result, written, arguments.figure))
     else:
         _print_summary(scenario.name, result)
         if arguments.trajectory is not None and written is None:
@@ -213,7 +247,11 @@ def _verify(arguments: argparse.Namespace) -> int:
     if arguments.kinematic:
         trajectory = replace(trajectory, kinematic=True)
     verification = verify(trajectory, load_scenario(arguments.scenario))
-    print(verification.summary())
+    if arguments.json:
+        _print_json({"ok": verification.ok, **asdict(verification)})
+    else:
+        verdict, *details = verification.summary().splitlines()
+        print("\n".join([_colored(verdict, GREEN if verification.ok else RED), *details]))
     return DONE if verification.ok else FAILED
 
 
@@ -247,6 +285,9 @@ def _planners(arguments: argparse.Namespace) -> int:
     """``cbrrt planners``."""
     from cbrrt_ompl.planning import PLANNERS
 
+    if arguments.json:
+        _print_json(PLANNERS)
+        return DONE
     width = max(map(len, PLANNERS))
     for name, description in PLANNERS.items():
         print(f"{name:{width}}  {description}")
@@ -270,13 +311,16 @@ def _bench(arguments: argparse.Namespace) -> int:
         runner = partial(run_on_cluster, address=arguments.scheduler, jobs=jobs)
     with _run_progress(campaign.size) as progress:
         summary = run_campaign(campaign, arguments.database, arguments.log_dir, runner, progress)
+    if arguments.json:
+        _print_json({**summary._asdict(), "database": str(arguments.database), "log_dir": str(arguments.log_dir)})
+        return FAILED if summary.crashes else DONE
     kept = f", {summary.kept:,} of them kept from before" if summary.kept else ""
     counted = (("planner", planners), ("scenario", scenarios))
     of, within = (f"{len(things)} {name}{'s' if len(things) > 1 else ''}" for name, things in counted)
     print(f"{summary.runs:,} runs of {of} in {within}{kept}")
     for name, reason in summary.crashes.items():
         print(f"{name}: {reason}, see {arguments.log_dir / 'cases' / f'{name}.error'}")
-    print(f"database: {arguments.database}, logs: {arguments.log_dir}, report: cbrrt report {arguments.database}")
+    print(f"database  {arguments.database}\nlogs      {arguments.log_dir}\nreport    cbrrt report {arguments.database}")
     return FAILED if summary.crashes else DONE
 
 
@@ -285,6 +329,10 @@ def _report(arguments: argparse.Namespace) -> int:
     from cbrrt_ompl.benchmark.report import write_report
 
     report = write_report(arguments.database, arguments.output, arguments.reference)
+    if arguments.json:
+        _print_json({"report": str(report.path), "invalid": report.invalid, "summary": report.summary})
+        return DONE
+    _print_report(report)
     for line in report.invalid:
         print(f"failed verification: {line}")
     print(report.path)
@@ -294,29 +342,89 @@ def _report(arguments: argparse.Namespace) -> int:
 def _demo(arguments: argparse.Namespace) -> int:
     """``cbrrt demo``."""
     arguments.output.mkdir(parents=True, exist_ok=True)
-    from cbrrt_ompl.demo import COLUMNS, caveat, run_demo
+    from cbrrt_ompl.demo import caveat, run_demo
 
-    widths = [max(len(name), width) for name, width in zip(COLUMNS, _DEMO_WIDTHS, strict=True)]
     runs = []
-    print(_aligned(COLUMNS, widths), flush=True)
+    print(_aligned(tuple(DEMO_COLUMNS), DEMO_COLUMNS.values()), flush=True)
     for run in run_demo(arguments.output, arguments.seed, _progress):
         runs.append(run)
-        print(_aligned(run.cells(), widths), flush=True)
-    print(f"\n{caveat(arguments.seed)}\nscenarios, trajectories, figures and results.md: {arguments.output}")
+        print(_aligned(_demo_cells(run), DEMO_COLUMNS.values()), flush=True)
+    print(f"\n{textwrap.fill(caveat(arguments.seed), LINE_WIDTH - 1)}")
+    print(f"scenarios, trajectories, figures and results.md: {arguments.output}")
     return DONE if all(run.as_published for run in runs) else FAILED
 
 
-_DEMO_WIDTHS = (11, 15, 28, 6, 6, 6, 8, 8, 5, 5, 3, 3)
-"""Widths of the columns of the demo's table, where their names are not wider."""
+DEMO_COLUMNS = {"scene": 11, "planner": 15, "result": 7, "nodes": 6, "paper": 7, "ms": 6, "paper ms": 8, "s": 4}
+"""Columns of the demo's table on a terminal, with their widths; results.md has all of them."""
 
 
-def _aligned(cells: Sequence[str], widths: Sequence[int]) -> str:
-    """Cells in columns, texts to the left and numbers to the right."""
-    left = 3
+def _demo_cells(run: DemoRun) -> tuple[str, ...]:
+    """A run in the columns of the terminal: what it was, what came of it, and the paper's numbers."""
+    result, paper, duration = run.result, run.published, "-"
+    outcome = "failed"
+    if result.trajectory is not None:
+        outcome, duration = "valid" if run.verified else "INVALID", f"{result.trajectory.duration:.1f}"
+    nodes = "failure" if paper.nodes is None else f"{paper.nodes:,}"
+    milliseconds = "failure" if paper.milliseconds is None else f"{paper.milliseconds:g}"
+    time = f"{1e3 * result.planning_time:,.1f}"
+    return (run.scene, result.planner, outcome, f"{result.nodes:,}", nodes, time, milliseconds, duration)
+
+
+def _aligned(cells: Iterable[str], widths: Iterable[int], left: int = 3) -> str:
+    """Cells in columns, the first ones to the left and the others to the right."""
     return "  ".join(
         cell.ljust(width) if column < left else cell.rjust(width)
         for column, (cell, width) in enumerate(zip(cells, widths, strict=True))
     )
+
+
+REPORT_COLUMNS = {"planner": 15, "succeeded": 12, "95 %": 10, "time [ms]": 9, "nodes": 9, "duration [s]": 12}
+"""Columns of a report on a terminal, with their widths; the report itself has quartiles and ratios too."""
+
+
+def _print_report(report: Report) -> None:
+    """Print the medians of a report, a table a scenario."""
+    scenario = None
+    for row in report.summary:
+        if row["scenario"] != scenario:
+            print(f"{'' if scenario is None else chr(10)}{row['scenario']}, medians")
+            print(_aligned(REPORT_COLUMNS, REPORT_COLUMNS.values(), left=1))
+            scenario = row["scenario"]
+        time, nodes, duration = (float(row[f"{name}_median"]) for name in ("time", "nodes", "duration"))
+        cells = (
+            row["planner"],
+            f"{row['successes']} of {row['runs']}",
+            f"{100.0 * row['success_low']:.0f}-{100.0 * row['success_high']:.0f} %",
+            f"{1e3 * time:,.1f}",
+            f"{nodes:,.0f}",
+            f"{duration:.1f}",
+        )
+        print(_aligned(cells, REPORT_COLUMNS.values(), left=1))
+
+
+def _completion(arguments: argparse.Namespace) -> int:
+    """``cbrrt completion``."""
+    import shtab
+
+    from cbrrt_ompl.planning import PLANNERS
+
+    parser = build_parser()
+    for action in _actions(parser):
+        if action.type is Path:
+            action.complete = shtab.DIRECTORY if action.metavar == "DIR" else shtab.FILE  # type: ignore[attr-defined]
+        elif action.dest in ("planner", "reference"):
+            action.choices = list(PLANNERS)
+    print(shtab.complete(parser, arguments.shell))
+    return DONE
+
+
+def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
+    """All arguments of a parser and of its commands."""
+    for action in parser._actions:
+        yield action
+        if isinstance(action, argparse._SubParsersAction):
+            for command in action.choices.values():
+                yield from _actions(command)
 
 
 def _window(**size: Any) -> Figure:
@@ -340,7 +448,8 @@ def _window(**size: Any) -> Figure:
 
 def _print_summary(scenario: str, result: PlanResult) -> None:
     """Print what came of a plan, a value a line."""
-    rows = [("scenario", scenario), ("planner", result.planner), ("status", result.status)]
+    status = _colored(result.status, GREEN if result.solved else RED)
+    rows = [("scenario", scenario), ("planner", result.planner), ("status", status)]
     if result.seed is not None:
         rows.append(("seed", str(result.seed)))
     rows += [
@@ -441,7 +550,28 @@ def _print_error(error: CbrrtError | OSError) -> None:
     if isinstance(error, OSError) and error.strerror:
         text = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
     for line in text.splitlines():
-        print(f"cbrrt: error: {line}", file=sys.stderr)
+        print(f"{_colored('cbrrt: error:', RED, sys.stderr)} {line}", file=sys.stderr)
+
+
+def _print_json(data: object) -> None:
+    """Print plain values as JSON; what is infinite or no number is null, since JSON has neither."""
+    print(json.dumps(_finite(data), indent=2, allow_nan=False))
+
+
+def _finite(data: Any) -> Any:
+    """Plain values without infinite ones."""
+    if isinstance(data, dict):
+        return {name: _finite(value) for name, value in data.items()}
+    if isinstance(data, (list, tuple)):
+        return [_finite(value) for value in data]
+    return None if isinstance(data, float) and not math.isfinite(data) else data
+
+
+def _colored(text: str, color: str, stream: TextIO | None = None) -> str:
+    """A text in a colour where a terminal shows it and nobody has set NO_COLOR."""
+    stream = stream or sys.stdout
+    plain = not stream.isatty() or os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
+    return text if plain else f"\033[{color}m{text}\033[0m"
 
 
 def _seconds(text: str) -> float:

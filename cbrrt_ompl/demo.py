@@ -11,10 +11,9 @@ from typing import NamedTuple, TypeAlias
 
 from matplotlib.figure import Figure
 
-from cbrrt_ompl.errors import MISSING, Problem, ScenarioError
 from cbrrt_ompl.figures import draw_plan, draw_velocities
 from cbrrt_ompl.planning import PlanResult, plan
-from cbrrt_ompl.scenario import Scenario, load_scenario
+from cbrrt_ompl.scenario import Scenario, load_scenario, scenario_path
 from cbrrt_ompl.verification import verify
 
 TIME_LIMIT = 300.0
@@ -150,23 +149,6 @@ def caveat(seed: int | None) -> str:
         f"One run each, seed {seed}; the paper reports one run each as well, on other hardware. The scenes are "
         "reconstructions: the published numbers are typical of them, the published figures were not at hand."
     )
-
-
-def scenario_path(name: str) -> Path:
-    """The file of a scenario that comes with the package, in a checkout or in an installed wheel.
-
-    Args:
-        name: name of the file without its suffix.
-
-    Raises:
-        ScenarioError: if there is no such file.
-    """
-    package = Path(__file__).resolve().parent
-    for folder in (package, package.parent):
-        path = folder / "scenarios" / f"{name}.yaml"
-        if path.is_file():
-            return path
-    raise ScenarioError(Problem("", MISSING, "a scenario that comes with the package"), f"{name}.yaml")
 
 
 def _write(stem: Path, run: DemoRun) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from cbrrt_ompl.errors import InputError, Problem, ScenarioError
+from cbrrt_ompl.errors import MISSING, InputError, Problem, ScenarioError
 from cbrrt_ompl.robot import Limits, Robot
 from cbrrt_ompl.scenario_file import MapSource, read_parts, scenario_data
 from cbrrt_ompl.sections import Report
@@ -67,7 +67,7 @@ def load_scenario(path: str | Path) -> Scenario:
     """Scenario from a YAML file.
 
     Args:
-        path: the file; see the page on scenario files for its keys.
+        path: the file; or the name of a scenario that comes with the package, where there is no such file.
 
     Returns:
         The scenario, checked.
@@ -77,12 +77,33 @@ def load_scenario(path: str | Path) -> Scenario:
     """
     from cbrrt_ompl.plain_yaml import read_yaml
 
+    path = Path(path)
+    if not (path.suffix or path.parent.name or path.exists()):
+        path = scenario_path(path.name)
     report = Report()
     try:
-        data = read_yaml(Path(path), report.problems)
+        data = read_yaml(path, report.problems)
     except InputError as error:
         raise ScenarioError(error.problems, str(path)) from None
-    return _make(data, str(path), Path(path).parent, report)
+    return _make(data, str(path), path.parent, report)
+
+
+def scenario_path(name: str) -> Path:
+    """The file of a scenario that comes with the package, in a checkout or in an installed wheel.
+
+    Args:
+        name: name of the file without its suffix.
+
+    Raises:
+        ScenarioError: if there is no such file, with the names that there are.
+    """
+    package = Path(__file__).resolve().parent
+    files = [file for folder in (package, package.parent) for file in (folder / "scenarios").glob("*.yaml")]
+    found = {file.stem: file for file in sorted(files)}
+    if name not in found:
+        expected = f"a scenario file, or one of those that come along: {', '.join(found)}"
+        raise ScenarioError(Problem("", MISSING, expected), name)
+    return found[name]
 
 
 def save_scenario(scenario: Scenario, path: str | Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import os
 import signal
 import sqlite3
@@ -609,7 +610,13 @@ def test_bench_and_report_from_the_command_line(
     ):
         assert plan(load_scenario(open_file), planner.removeprefix("control_"), seed).nodes == nodes
     assert main(["report", str(database), "--output", str(output)]) == 0
-    assert capsys.readouterr().out == f"{output / 'report.md'}\n"
+    header, columns, *rows, path = capsys.readouterr().out.splitlines()
+    assert (header, path) == ("open, medians", str(output / "report.md"))
+    assert [row.split()[:4] for row in rows] == [[planner, "2", "of", "2"] for planner in ("cb-rrt", "rrt")]
+    assert {len(line) for line in (columns, *rows)} <= set(range(81))
+    assert main(["report", str(database), "--output", str(output), "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert [(row["planner"], row["successes"]) for row in printed["summary"]] == [("cb-rrt", 2), ("rrt", 2)]
     assert "| rrt | 2 of 2 |" in (output / "report.md").read_text(encoding="utf-8")
 
 

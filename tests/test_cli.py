@@ -19,7 +19,7 @@ from cbrrt_ompl.scenario import load_scenario
 from cbrrt_ompl.trajectory import Trajectory
 from cbrrt_ompl.verification import verify
 
-COMMANDS = ("plan", "verify", "show", "planners", "demo", "bench", "report")
+COMMANDS = ("plan", "verify", "show", "planners", "demo", "bench", "report", "completion")
 
 OPEN = """
 name: open
@@ -255,8 +255,90 @@ def test_help_of_every_command_has_an_example(capsys: pytest.CaptureFixture[str]
         with pytest.raises(SystemExit) as caught:
             main([command, "--help"])
         assert caught.value.code == 0
-        example = capsys.readouterr().out.partition("example:\n  cbrrt ")[2].split()
+        example = capsys.readouterr().out.partition("example:\n  cbrrt ")[2].replace("\\\n", "").split()
         assert build_parser().parse_args(example).run.__doc__ == f"``cbrrt {command}``."
+
+
+def test_the_examples_of_the_whole_command_exist(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    lines = capsys.readouterr().out.partition("examples:\n")[2].partition("\n\n")[0].splitlines()
+    examples = [line.strip().partition("   ")[0].split() for line in lines]
+    assert len(examples) >= 4
+    for program, *arguments in examples:
+        assert program == "cbrrt"
+        assert callable(build_parser().parse_args(arguments).run)
+
+
+def test_help_fits_80_columns(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    for command in ([], *([command] for command in COMMANDS)):
+        with pytest.raises(SystemExit):
+            main([*command, "--help"])
+    assert max(map(len, capsys.readouterr().out.splitlines())) <= 80
+
+
+@pytest.mark.parametrize(
+    ("terminal", "no_color", "colored"), [(True, "", True), (True, "1", False), (False, "", False)]
+)
+def test_colors_are_for_terminals_without_no_color(
+    open_file: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+    terminal: bool, no_color: str, colored: bool,
+) -> None:  # fmt: skip
+    monkeypatch.setenv("NO_COLOR", no_color)
+    monkeypatch.setenv("TERM", "xterm")
+    for stream in (sys.stdout, sys.stderr):
+        monkeypatch.setattr(stream, "isatty", lambda: terminal)
+    assert main(["plan", str(open_file), "--seed", "1"]) == 0
+    assert main(["plan", str(open_file.with_name("none.yaml"))]) == 2
+    captured = capsys.readouterr()
+    assert ("\033[32msolved\033[0m" in captured.out) == ("\033" in captured.out) == colored
+    assert ("\033[31mcbrrt: error:\033[0m" in captured.err) == ("\033" in captured.err) == colored
+
+
+def test_planners_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["planners", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == planning.PLANNERS
+
+
+def test_verification_as_json(
+    saved: Path, open_file: Path, walled_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["verify", str(saved), str(open_file), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["ok"] is True and found["violations"] == [] and found["smallest_clearance"] > 0.0
+    assert main(["verify", str(saved), str(walled_file), "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert found["ok"] is False
+    assert "collision" in {violation["kind"] for violation in found["violations"]}
+
+
+def test_a_scenario_that_comes_along_is_found_by_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["plan", "paper_case1", "--planner", "cb-rrt-compiled", "--seed", "1", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["scenario"] == "Case 1"
+    assert main(["plan", "paper_case9"]) == 2
+    (line,) = error_lines(capsys)
+    assert line.startswith("paper_case9: ") and "paper_case1, paper_case2" in line
+
+
+def test_completion_knows_commands_planners_and_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The script is run by bash, as it would be on the Tab key."""
+    assert main(["completion", "bash"]) == 0
+    script = tmp_path / "cbrrt.bash"
+    script.write_text(capsys.readouterr().out, encoding="utf-8")
+    (tmp_path / "mine.yaml").touch()
+    for line, wanted in (("cbrrt pla", {"plan", "planners"}), ("cbrrt plan --planner cb-rrt-r", {"cb-rrt-robust"}),
+                         ("cbrrt plan mi", {"mine.yaml"})):  # fmt: skip
+        words = line.split()
+        code = f"""source {script}; COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}
+                   _shtab_cbrrt cbrrt {words[-1]} {words[-2]}; printf '%s\\n' "${{COMPREPLY[@]}}" """
+        done = subprocess.run(
+            ["bash", "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=True
+        )
+        assert set(done.stdout.split()) == wanted, done.stderr
 
 
 def test_help_imports_nothing_heavy() -> None:
@@ -345,7 +427,8 @@ def test_the_demo_writes_figures_trajectories_and_table(
     output = tmp_path / "new" / "demo"
     assert main(["demo", "--output", str(output)]) == 0
     out = capsys.readouterr().out
-    assert out.count(" solved ") == out.count(" yes") == 6
+    assert out.count(" valid ") == 6
+    assert max(map(len, out.splitlines()[:-1])) <= 80  # the last line has the folder's path
     in_ompl = ["paper_case1_cb-rrt", "paper_case1_s-rrt", "paper_case2_cb-rrt"]
     stems = [stem + suffix for stem in in_ompl for suffix in ("", "-compiled")]
     names = {f"{stem}{suffix}" for stem in stems for suffix in (".csv", ".png")}

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import permutations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +44,8 @@ class Report:
     """The report itself, Markdown."""
     invalid: tuple[str, ...]
     """Planners whose exact solutions failed verification, with scenario and number."""
+    summary: tuple[dict[str, Any], ...]
+    """The rows of summary.csv by their header."""
 
 
 def write_report(database: Path, output: Path, reference: str | None = None) -> Report:
@@ -65,14 +68,16 @@ def write_report(database: Path, output: Path, reference: str | None = None) -> 
         raise UnknownPlannerError(reference, planners)
     output.mkdir(parents=True, exist_ok=True)
     ratios = {experiment.name: all_ratios(experiment) for experiment in experiments}
-    _write_csv(output / "summary.csv", SUMMARY_COLUMNS, (_summary_row(s) for e in experiments for s in e.series))
+    summary = [_summary_row(one) for experiment in experiments for one in experiment.series]
+    _write_csv(output / "summary.csv", SUMMARY_COLUMNS, summary)
     _write_csv(output / "ratios.csv", RATIO_COLUMNS, _ratio_rows(ratios))
     for experiment in experiments:
         success_figure(experiment).savefig(output / f"success_{experiment.name}.png")
         boxes_figure(experiment).savefig(output / f"boxes_{experiment.name}.png")
     path = output / "report.md"
     path.write_text("\n".join(_markdown(experiments, reference, ratios)), encoding="utf-8")
-    return Report(path, tuple(_invalid(experiments)))
+    rows = (dict(zip(SUMMARY_COLUMNS, row, strict=True)) for row in summary)
+    return Report(path, tuple(_invalid(experiments)), tuple(rows))
 
 
 Ratios = dict[tuple[str, str, str], Ratio]
