@@ -3,11 +3,12 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help demo test clean
+.PHONY: help demo test docs clean
 help:
 	@echo "make demo   install into $(VENV) and run both planners of the paper on its two scenes"
 	@echo "make test   install into $(VENV) and run every check: ruff, mypy, import-linter, pytest"
-	@echo "make clean  remove $(VENV), demo/ and all caches"
+	@echo "make docs   install into $(VENV) and build the pages of docs/ into site/, without a warning"
+	@echo "make clean  remove $(VENV), demo/, site/ and all caches"
 
 demo: $(VENV)/demo.stamp
 	$(BIN)/cbrrt demo --output demo
@@ -19,8 +20,12 @@ test: $(VENV)/test.stamp
 	$(BIN)/lint-imports
 	$(BIN)/python -m pytest -n 2
 
+docs: $(VENV)/docs.stamp
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
 $(VENV)/demo.stamp: EXTRA :=
 $(VENV)/test.stamp: EXTRA := [test]
+$(VENV)/docs.stamp: EXTRA := [docs]
 $(VENV)/%.stamp: pyproject.toml Makefile
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 10) <= sys.version_info < (3, 13))' || { \
 		echo "error: '$(PYTHON)' is not Python 3.10, 3.11 or 3.12; name one: make PYTHON=python3.12" >&2; exit 1; }
@@ -31,5 +36,5 @@ $(VENV)/%.stamp: pyproject.toml Makefile
 	@touch $@
 
 clean:
-	rm -rf $(VENV) demo build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) demo site build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find cbrrt_ompl tests -type d -name __pycache__ -prune -exec rm -rf {} +

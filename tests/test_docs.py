@@ -1,0 +1,160 @@
+"""The pages: they build without a warning, hold every key and name, and show what can be run."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from test_package import tomllib
+from test_readme import blocks
+
+import cbrrt_ompl
+from cbrrt_ompl import scenario_file
+from cbrrt_ompl.cli import build_parser
+from cbrrt_ompl.robot import Gains, Limits
+from cbrrt_ompl.scenario import load_scenario
+from cbrrt_ompl.sections import Key
+from cbrrt_ompl.settings import Goal, PlanningSettings, State
+
+SECTIONS: dict[str, Mapping[str, Key]] = {
+    "Top level": scenario_file.SCENARIO,
+    **scenario_file.OBSTACLES,
+    "map": scenario_file.MAP,
+    "robot": scenario_file.ROBOT,
+    "robot.footprint": {name: key for keys in scenario_file.FOOTPRINTS.values() for name, key in keys.items()},
+    "robot.limits": scenario_file.LIMITS,
+    "robot.gains": scenario_file.GAINS,
+    "start": scenario_file.START,
+    "goal": scenario_file.GOAL,
+    "planning": scenario_file.PLANNING,
+}
+"""The headings of the page on scenario files, and the keys that belong there."""
+
+LIMITS = Limits()
+DEFAULTS: dict[str, Mapping[str, Any]] = {
+    "robot.limits": {
+        "v": [LIMITS.v_min, LIMITS.v_max],
+        "omega": [LIMITS.omega_min, LIMITS.omega_max],
+        **LIMITS._asdict(),
+    },
+    "robot.gains": Gains()._asdict(),
+    "start": State(0.0, 0.0)._asdict(),
+    "goal": vars(Goal(0.0, 0.0)),
+    "planning": vars(PlanningSettings()),
+}
+"""What the code takes for a key that is left out."""
+
+
+@pytest.fixture(scope="module")
+def docs(repository: Path) -> Path:
+    return repository / "docs"
+
+
+def rows(page: str, heading: str) -> dict[str, tuple[str, str]]:
+    """The table under a heading: what stands behind the key, and the default, by the key."""
+    section = re.split(rf"^#+ {re.escape(heading)}$", page, flags=re.MULTILINE)[1].partition("\n#")[0]
+    found = re.findall(r"^\| `(\w+)`([^|]*)\|([^|]*)\|", section, flags=re.MULTILINE)
+    return {key: (mark.strip(), default.strip()) for key, mark, default in found}
+
+
+@pytest.mark.parametrize("heading", SECTIONS)
+def test_the_scenario_page_has_every_key_and_no_other(docs: Path, heading: str) -> None:
+    page = (docs / "scenario.md").read_text(encoding="utf-8")
+    found = rows(page, heading)
+    assert list(found) == list(SECTIONS[heading])
+    for name, key in SECTIONS[heading].items():
+        mark, default = found[name]
+        assert (mark == "°") == key.is_angle, name
+        assert (default == "**required**") == bool(key.required), name
+
+
+@pytest.mark.parametrize("heading", DEFAULTS)
+def test_the_defaults_on_the_scenario_page_are_those_of_the_code(docs: Path, heading: str) -> None:
+    page = (docs / "scenario.md").read_text(encoding="utf-8")
+    for name, (_, default) in rows(page, heading).items():
+        if default == "**required**":
+            continue
+        value = DEFAULTS[heading][name]
+        stated = re.fullmatch(r"`(.*)`( deg)?", default)
+        assert (stated is None) == (value is None), name
+        if stated is not None:
+            plain = yaml.safe_load(stated[1])
+            assert plain == value or numbers_agree(plain, value, math.radians(1.0) if stated[2] else 1.0), name
+
+
+def numbers_agree(stated: Any, value: Any, unit: float) -> bool:
+    """Whether numbers are equal but for their unit."""
+    pairs = zip(stated, value, strict=True) if isinstance(stated, list) else [(stated, value)]
+    return all(one * unit == pytest.approx(other) for one, other in pairs)
+
+
+def test_every_public_name_is_on_the_python_page(docs: Path) -> None:
+    documented = re.findall(r"^::: (\S+)$", (docs / "api.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
+    names = {entry.rpartition(".")[2] for entry in documented}
+    assert set(cbrrt_ompl.__all__) - {"__version__"} <= names
+
+
+def test_the_pages_build_without_a_warning(repository: Path, tmp_path: Path) -> None:
+    """Also checks the links between the pages, and that every page is in the navigation."""
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path)]
+    environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
+    done = subprocess.run(
+        command, cwd=repository, env=environment, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "WARNING" not in done.stderr
+    page = (tmp_path / "api.html").read_text(encoding="utf-8")
+    assert 'id="cbrrt_ompl.planning.plan"' in page
+    assert not re.search(r":(?:func|class|meth):", page)
+
+
+def test_the_pages_request_nothing_from_elsewhere(repository: Path) -> None:
+    settings = yaml.safe_load((repository / "mkdocs.yml").read_text(encoding="utf-8"))
+    assert settings["theme"]["font"] is False
+    assert not [name for name in settings.get("extra_css", []) + settings.get("extra_javascript", []) if "//" in name]
+
+
+def test_the_commands_on_the_pages_exist(docs: Path) -> None:
+    text = "\n".join(path.read_text(encoding="utf-8").replace("\\\n", " ") for path in docs.glob("*.md"))
+    lines = [line.strip() for block in blocks(text, "console") for line in block.splitlines()]
+    commands = [shlex.split(line.removeprefix("$ "))[1:] for line in lines if line.startswith("$ cbrrt ")]
+    assert len(commands) > 5
+    for arguments in commands:
+        assert callable(build_parser().parse_args(arguments).run)
+
+
+def test_the_scenario_on_the_scenario_page_can_be_loaded(docs: Path, tmp_path: Path) -> None:
+    (text,) = blocks((docs / "scenario.md").read_text(encoding="utf-8"), "yaml")
+    path = tmp_path / "scenario.yaml"
+    path.write_text(text, encoding="utf-8")
+    assert len(load_scenario(path).world.obstacles) == 4
+
+
+@pytest.mark.parametrize("page", ["getting-started.md", "own-map.md", "faq.md"])
+def test_the_python_on_the_pages_runs(repository: Path, docs: Path, tmp_path: Path, page: str) -> None:
+    code = "\n".join(blocks((docs / page).read_text(encoding="utf-8"), "python"))
+    environment = {**os.environ, "PYTHONPATH": str(repository)}
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    assert {"getting-started.md": "Exact solution", "own-map.md": "solved", "faq.md": "1 sampler made"}[
+        page
+    ] in done.stdout
+
+
+def test_the_citation_has_the_version_of_the_project(repository: Path) -> None:
+    with (repository / "pyproject.toml").open("rb") as file:
+        project = tomllib.load(file)["project"]
+    citation = yaml.safe_load((repository / "CITATION.cff").read_text(encoding="utf-8"))
+    assert citation["version"] == project["version"]
+    assert re.fullmatch(r"\d+\.\d+\.\d+((a|b|rc)\d+)?", project["version"])
