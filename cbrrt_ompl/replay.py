@@ -6,7 +6,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cbrrt_ompl.extension import STEERING, advance, unpack_model
+from cbrrt_ompl.control_laws import reference_pose
+from cbrrt_ompl.extension import CANDIDATES, STEERING, advance, candidate, unpack_model
+from cbrrt_ompl.settings import State
 from cbrrt_ompl.trajectory import Trajectory
 from cbrrt_ompl.tree import Tree
 
@@ -47,6 +49,31 @@ def tree_from_controls(
         model: packed model that the controls were made for.
     """
     return Tree(states, parents, replay_edges(states, parents, controls, steps, model))
+
+
+def extension_trajectories(node: State, sample: tuple[float, float], model: NDArray[np.float64]) -> list[Trajectory]:
+    """What an extension tries from a node, as if there were no obstacles and no goal.
+
+    Args:
+        node: state to extend.
+        sample: position to drive towards [m].
+        model: packed model.
+
+    Returns:
+        One whole horizon for CB-RRT; for S-RRT one for each steering rate: right, straight on, left.
+    """
+    unpacked = unpack_model(model)
+    x, y, theta, v, omega = (float(value) for value in node)
+    reference = reference_pose(x, y, theta, float(sample[0]), float(sample[1]), unpacked.look_ahead)
+    controls = [
+        candidate(index, (x, y, theta, v, omega), reference, unpacked)[2]
+        for index in range(CANDIDATES if unpacked.law == STEERING else 1)
+    ]
+    steps = np.array([unpacked.steps])
+    return [
+        trajectory_from_controls(np.array([x, y, theta, v, omega]), np.array([control]), steps, model)
+        for control in controls
+    ]
 
 
 @njit(cache=True)

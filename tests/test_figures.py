@@ -19,11 +19,14 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Wedge
 from matplotlib.patches import Polygon as PolygonPatch
 from numpy.typing import NDArray
+from test_extension import OUT_OF_REACH, WIDE, drive
 
+from cbrrt_ompl.extension import OPEN_LOOP, STEERING, pack_model
 from cbrrt_ompl.figures import (
     PATH_COLOR,
     TREE_COLOR,
     TURN_COLOR,
+    draw_extension,
     draw_plan,
     draw_scene,
     draw_trajectory,
@@ -35,7 +38,7 @@ from cbrrt_ompl.obstacles import Bounds, Box, Disc, Obstacle, Polygon
 from cbrrt_ompl.planning import PlanResult
 from cbrrt_ompl.robot import Footprint, Limits, Robot
 from cbrrt_ompl.scenario import Scenario
-from cbrrt_ompl.settings import Goal, State
+from cbrrt_ompl.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.trajectory import Trajectory
 from cbrrt_ompl.tree import Tree
 from cbrrt_ompl.world import World
@@ -282,3 +285,49 @@ def test_figures_leave_no_trace_in_pyplot(tree: Tree, trajectory: Trajectory) ->
     before = pyplot.get_fignums()
     draw_plan(result(tree, trajectory), scenario()).savefig(io.BytesIO(), format="svg")
     assert pyplot.get_fignums() == before
+
+
+class TestExtension:
+    NODE = State(0.5, -0.2, 0.3, 0.4, 0.1)
+    SAMPLE = (3.0, 1.5)
+
+    def test_it_starts_at_the_node_and_ends_where_the_planner_would(self, ax: Axes) -> None:
+        assert draw_extension(ax, self.NODE, self.SAMPLE, Robot(), PlanningSettings()) is ax
+        found = drive(WIDE, self.NODE, self.SAMPLE, pack_model(OPEN_LOOP, Robot(), OUT_OF_REACH, PlanningSettings()))
+        np.testing.assert_array_equal(points(ax, "node"), [self.NODE[:2]])
+        np.testing.assert_allclose(points(ax, "motion")[0], self.NODE[:2])
+        np.testing.assert_allclose(points(ax, "motion")[-1], found.state[:2], atol=1e-12)
+        np.testing.assert_allclose(points(ax, "new node"), [found.state[:2]], atol=1e-12)
+
+    def test_the_error_posture_goes_along_the_heading_and_then_across(self, ax: Axes) -> None:
+        draw_extension(ax, self.NODE, self.SAMPLE, Robot(), PlanningSettings(look_ahead=1.5))
+        node, corner, reference = points(ax, "error posture")
+        np.testing.assert_allclose(reference, points(ax, "reference")[0])
+        assert math.dist(node, reference) == pytest.approx(1.5)
+        assert math.atan2(*(corner - node)[::-1]) == pytest.approx(0.3)
+        assert np.dot(corner - node, reference - corner) == pytest.approx(0.0, abs=1e-12)
+        shown = [text.get_text() for text in ax.texts if "=" in text.get_text()]
+        assert shown[0] == f"$x_e$ = {math.dist(node, corner):.2f} m"
+
+    def test_a_sample_behind_is_a_point_turn(self, ax: Axes) -> None:
+        draw_extension(ax, State(0.0, 0.0), (-2.0, 0.5), Robot(), PlanningSettings())
+        np.testing.assert_allclose(points(ax, "motion"), 0.0, atol=1e-12)
+
+    def test_s_rrt_has_three_choices_and_takes_the_one_that_ends_nearest(self, ax: Axes) -> None:
+        draw_extension(ax, self.NODE, self.SAMPLE, Robot(), PlanningSettings(), "s-rrt")
+        found = drive(WIDE, self.NODE, self.SAMPLE, pack_model(STEERING, Robot(), OUT_OF_REACH, PlanningSettings()))
+        np.testing.assert_allclose(points(ax, "motion")[-1], found.state[:2], atol=1e-12)
+        left_out = [drawn for drawn in ax.lines if drawn.get_label() == "left out"]
+        assert len(left_out) == 2
+        reference = points(ax, "reference")[0]
+        ends = [np.asarray(drawn.get_xydata())[-1] for drawn in left_out]
+        assert min(math.dist(end, reference) for end in ends) > math.dist(points(ax, "motion")[-1], reference)
+
+    def test_every_arrow_is_in_view(self, ax: Axes) -> None:
+        """An arrow whose tip was outside of the axes was not drawn at all."""
+        draw_extension(ax, State(0.0, 0.0, 0.3), (-1.8, 1.0), Robot(), PlanningSettings())
+        ax.figure.draw_without_rendering()
+        (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
+        tips = [text.xy for text in ax.texts if not text.get_text()]  # type: ignore[attr-defined]
+        assert len(tips) == 3
+        assert all(x0 < x < x1 and y0 < y < y1 for x, y in tips)
