@@ -284,11 +284,13 @@ def draw_extension(
         ax.plot(dots[:, 0], dots[:, 1], linestyle="none", marker="o", markersize=3.0, color=color, zorder=3)
         if chosen:
             end = one.poses[-1]
-    for (x, y, theta), color, label, style in (
-        (end, TREE_COLOR, "new node", {"marker": "o", "markersize": 9, "fillstyle": "none", "markeredgewidth": 1.6}),
+    ring: dict[str, Any] = {"marker": "o", "markersize": 9, "fillstyle": "none", "markeredgewidth": 1.6}
+    marks: tuple[tuple[Any, str, str, dict[str, Any]], ...] = (
+        (end, TREE_COLOR, "new node", ring),
         (reference, REFERENCE_COLOR, "reference", {"marker": "D", "markersize": 5}),
         (node[:3], START_COLOR, "node", {"marker": "o", "markersize": 5}),
-    ):
+    )
+    for (x, y, theta), color, label, style in marks:
         ax.plot(x, y, linestyle="none", color=color, zorder=5, label=label, **style)
         ax.update_datalim([(x + mark * math.cos(theta), y + mark * math.sin(theta))])
         _draw_heading(ax, x, y, theta, mark, color)
