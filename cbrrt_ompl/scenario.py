@@ -211,11 +211,15 @@ def _start_problems(start: State, world: World | None, robot: Robot | None) -> I
     if world is None:
         return
     if not world.bounds.contains(start.x, start.y):
-        yield Problem(
-            "start", [start.x, start.y], f"a position inside the bounds {world.bounds.min}, {world.bounds.max}"
-        )
+        yield Problem("start", [start.x, start.y], _inside(world))
     elif robot is not None and world.collides(robot.footprint, start[:3]):
         yield Problem("start", list(start[:3]), "a pose where the footprint touches no obstacle and no bound")
+
+
+def _inside(world: World) -> str:
+    """What is expected of a position."""
+    low, high = (tuple(round(float(value), 6) for value in corner) for corner in (world.bounds.min, world.bounds.max))
+    return f"a position inside the bounds {low}, {high}"
 
 
 def _velocity_problems(start: State, limits: Limits) -> Iterator[Problem]:
@@ -234,7 +238,7 @@ def _velocity_problems(start: State, limits: Limits) -> Iterator[Problem]:
 def _goal_problems(goal: Goal, world: World, robot: Robot | None) -> Iterator[Problem]:
     """Why no state of the goal region can be reached."""
     if not world.bounds.contains(goal.x, goal.y):
-        yield Problem("goal", [goal.x, goal.y], f"a position inside the bounds {world.bounds.min}, {world.bounds.max}")
+        yield Problem("goal", [goal.x, goal.y], _inside(world))
     elif robot is not None and not _may_be_free(goal, world, robot):
         yield Problem("goal", [goal.x, goal.y], "a region with room for the robot: all of it is in collision")
 
