@@ -677,7 +677,7 @@ def test_help_of_both_commands_has_an_example(capsys: pytest.CaptureFixture[str]
     for command in ("bench", "report"):
         with pytest.raises(SystemExit):
             main([command, "--help"])
-        example = capsys.readouterr().out.partition("example:\n  cbrrt ")[2].split()
+        example = capsys.readouterr().out.partition("example:\n  cbrrt ")[2].replace("\\\n", "").split()
         assert build_parser().parse_args(example).run.__doc__ == f"``cbrrt {command}``."
 
 
