@@ -28,6 +28,9 @@ COLLISION = -1.0
 UNDECIDED = 0.0
 """Certificate of a position that only FCL can decide."""
 
+ROOM = 5e-4
+"""Distance that planned motions keep from everything [m]; poses by themselves only have to be free."""
+
 CERTIFICATE_MARGIN = 1e-6
 """What a certificate must hold by [m]: well above the rounding of FCL's closed-form distances and of its GJK."""
 
@@ -286,7 +289,8 @@ class ClearanceMap:
         Returns:
             Rows of ``answers`` in use afterwards.
         """
-        if self._refine(x, y, theta) != UNDECIDED:
+        certificate = self._refine(x, y, theta)
+        if certificate == COLLISION or certificate > ROOM:
             return answered
         if answered == len(self.answers):
             self.answers = np.concatenate([self.answers, np.empty_like(self.answers)])

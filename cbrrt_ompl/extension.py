@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cbrrt_ompl.clearance_map import COLLISION, UNDECIDED, MapView, certify, certify_pose
+from cbrrt_ompl.clearance_map import COLLISION, ROOM, UNDECIDED, MapView, certify, certify_pose
 from cbrrt_ompl.control_laws import reference_pose, steering_rate, tracking_command
 from cbrrt_ompl.errors import Problem, SettingsError
 from cbrrt_ompl.kinematics import (
@@ -47,8 +47,8 @@ OPEN_LOOP, CLOSED_LOOP, STEERING = 0, 1, 2
 EXTENDED, REFUSED, BLOCKED, ASK = 0, 1, 2, 3
 """What came of an extension: a new node, line 5 of Algorithm II, an obstacle, or a question to FCL."""
 
-MOTION_RESOLUTION = 1e-3
-"""Largest distance between two checked points of a motion [m]: nothing thicker than this is passed through."""
+MOTION_RESOLUTION = 2.0 * ROOM
+"""Largest distance between two checked points of a motion [m]."""
 
 CANDIDATES = 3
 """Extensions tried for one sample at most: the three steering rates of S-RRT."""
@@ -324,12 +324,13 @@ def check_step_motion(
 ) -> tuple[int, float, bool, tuple[float, float, float]]:
     """Check the points of one step, each no more than `MOTION_RESOLUTION` after the one before.
 
-    A point with margin m proves all points of the next m metres, so few of them are looked at. What is accepted depends
-    on the points alone, never on what the map holds.
+    Every point must be farther than `ROOM` from everything: then no obstacle, however thin, fits between two of them. A
+    point that is farther by m proves all points of the next m metres, so few of them are looked at. What is accepted
+    depends on the points alone, never on what the map holds.
 
     Args:
         step: the step.
-        margin: distance proven free at its start [m].
+        margin: distance proven free at its start, beyond `ROOM` [m].
         is_certified: whether the margin holds for every heading; else it does for the heading there.
         view: the clearance map.
         answers: what FCL has said, see :func:`find_answer`.
@@ -355,10 +356,11 @@ def check_step_motion(
             omega = step.omega + share * (step.omega_end - step.omega)
             pose = unicycle_step(step.x, step.y, step.theta, step.v, step.omega, v, omega, share * dt)
         margin, is_certified = certify_pose(view, pose[0], pose[1], pose[2])
-        if margin == UNDECIDED:
+        if UNDECIDED <= margin <= ROOM:
             margin, is_certified = find_answer(answers, answered, pose[0], pose[1], pose[2]), False
             if margin < 0.0:
                 return ASK, margin, is_certified, pose
+        margin -= ROOM
         if margin <= 0.0:
             return BLOCKED, margin, is_certified, pose
     return EXTENDED, margin, is_certified, pose
@@ -454,7 +456,7 @@ def roll_out(
     near_goal = goal.tolerance * goal.tolerance * (1.0 + 1e-9)
     reach = 0.0 if view.is_round else view.outer
     margin, is_certified = certify_pose(view, x, y, theta)
-    margin = max(margin, 0.0)
+    margin = max(margin - ROOM, 0.0)
     k = 0
     while k < steps:
         if manoeuvres or model.law == CLOSED_LOOP:

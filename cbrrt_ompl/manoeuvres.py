@@ -57,7 +57,7 @@ def next_velocity(way: float, velocity: float, low: float, high: float, largest_
     rest = abs(left) - 0.5 * largest_change * dt * full_steps * (full_steps + 1.0)
     wanted = math.copysign(full_steps * largest_change + rest / ((full_steps + 1.0) * dt), left)
     found = clamp(clamp(wanted, low, high), velocity - largest_change, velocity + largest_change)
-    return 0.0 if abs(found) < AT_REST else found
+    return 0.0 if abs(found) < AT_REST and abs(velocity) <= largest_change else found
 
 
 @njit(cache=True)

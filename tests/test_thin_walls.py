@@ -1,4 +1,4 @@
-"""A wall 1 mm thick is never passed, whatever the angle and wherever it stands between two steps."""
+"""A thin wall is never passed, be it of a micrometre, whatever the angle and wherever it stands between two steps."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from cbrrt_ompl.scenario import Scenario
 from cbrrt_ompl.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.world import World
 
-THICKNESS = 1e-3
+THICKNESS = 1e-6
 SPEED = 1.0
 LAWS = {"open loop": OPEN_LOOP, "closed loop": CLOSED_LOOP, "steering": STEERING}
 FOOTPRINTS = {
