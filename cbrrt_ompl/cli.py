@@ -1,4 +1,4 @@
-"""The command line: ``cbrrt plan | verify | show | planners | bench | report | demo | completion``.
+"""The command line: ``cbrrt plan | verify | show | planners | bench | report | reproduce | demo | completion``.
 
 Exit codes: 0 done, 1 not solved or not verified, 2 bad input, 130 interrupted. Modules that take long to import are
 imported where they are used, so that ``cbrrt --help`` answers at once.
@@ -90,6 +90,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_planners(commands)
     _add_bench(commands)
     _add_report(commands)
+    _add_reproduce(commands)
     _add_demo(commands)
     _add_completion(commands)
     return parser
@@ -172,6 +173,19 @@ def _add_report(commands: Any) -> None:
         "--reference", metavar="NAME", help="planner to compare the others with (default: cb-rrt, if it is there)"
     )
     _add_json(parser)
+
+
+def _add_reproduce(commands: Any) -> None:
+    summary = "measure the paper again and report which of its claims hold"
+    parser = _add_command(commands, "reproduce", _reproduce, summary, "cbrrt reproduce --runs 20 --output reproduction")
+    parser.add_argument(
+        "--runs", type=_count, default=200, metavar="N", help="runs of each planner in each scene (default: 200)"
+    )
+    parser.add_argument(
+        "--output", type=Path, default=Path("reproduction"), metavar="DIR",
+        help="folder for report.html, report.md and the runs; the same command goes on from what it holds",
+    )  # fmt: skip
+    parser.add_argument("--jobs", type=_count, metavar="J", help="processes at a time (default: one a processor)")
 
 
 def _add_demo(commands: Any) -> None:
@@ -337,6 +351,24 @@ def _report(arguments: argparse.Namespace) -> int:
         print(f"failed verification: {line}")
     print(report.path)
     return DONE
+
+
+def _reproduce(arguments: argparse.Namespace) -> int:
+    """``cbrrt reproduce``."""
+    from cbrrt_ompl.reproduce.reproduction import reproduce
+    from cbrrt_ompl.reproduce.study import study_size
+
+    command = f"cbrrt reproduce --runs {arguments.runs} --output {arguments.output}"
+    command += f" --jobs {arguments.jobs}" if arguments.jobs else ""
+    with _run_progress(study_size(arguments.runs)) as progress:
+        made = reproduce(arguments.output, arguments.runs, arguments.jobs, command=command, progress=progress)
+    print(f"{made.runs:,} runs{f', {made.kept:,} of them kept from before' if made.kept else ''}")
+    for claim in made.claims:
+        print(f"{claim.verdict.value}: {claim.text}")
+    for name, reason in made.failures.items():
+        print(f"runs of {name} are missing: {reason}")
+    print(made.page)
+    return FAILED if made.failures else DONE
 
 
 def _demo(arguments: argparse.Namespace) -> int:

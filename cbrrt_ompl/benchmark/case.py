@@ -149,7 +149,7 @@ def crash_log(case: Case, settings: tuple[str, ...] = ()) -> Log:
 
 def main() -> None:
     """Run the case on the standard input."""
-    _die_with_parent(int(sys.argv[2]))
+    die_with_parent(int(sys.argv[2]))
     case = Case(**json.load(sys.stdin))
     from cbrrt_ompl.benchmark.experiment import Experiment
     from cbrrt_ompl.scenario import scenario_from_dict
@@ -159,8 +159,12 @@ def main() -> None:
     Path(sys.argv[1]).write_text(format_log(log), encoding="utf-8")
 
 
-def _die_with_parent(parent: int) -> None:
-    """Have the kernel kill this process as soon as the one that waits for it has ended, whatever ended it."""
+def die_with_parent(parent: int) -> None:
+    """Have the kernel kill this process as soon as the one that waits for it has ended, whatever ended it.
+
+    Args:
+        parent: number of the process that waits.
+    """
     if sys.platform == "linux":
         ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
         if os.getppid() != parent:

@@ -40,6 +40,7 @@ def run(
     should_stop: Callable[[int], bool],
     clearance_map: ClearanceMap | None = None,
     on_equipped: Callable[[Equipment], None] = lambda _: None,
+    prepare: Callable[[Any], None] = lambda _: None,
 ) -> Found:
     """Set a planner up and let it solve the scenario.
 
@@ -51,6 +52,7 @@ def run(
         should_stop: called once a round of the planner's main loop, with the rounds so far.
         clearance_map: of the scenario's world and footprint; None takes the one that goes with the world.
         on_equipped: takes what the planner was given.
+        prepare: takes the ``SimpleSetup`` before it is set up, to change it.
     """
     with quiet_ompl():
         # OMPL complains about a second seed in a process; yet all that is random below is allocated from here on
@@ -58,6 +60,7 @@ def run(
         clearance_map = clearance_map or clearance_map_for(scenario.world, scenario.robot.footprint)
         setup, equipment = make_equipped_setup(scenario, planner, clearance_map)
         on_equipped(equipment)
+        prepare(setup)
         setup.setup()
         rounds = _Rounds(scenario.planning.max_samples, should_stop)
         condition = ob.PlannerTerminationCondition(ob.PlannerTerminationConditionFn(rounds))

@@ -1,0 +1,92 @@
+"""What a nearest-neighbour query costs the compiled planners: grid, k-d tree and brute force, by the number of nodes."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from cbrrt_ompl.compiled.nearest import BRUTE_FORCE, GRID, KD_TREE, KINDS, Index, insert, nearest
+
+SIDE = 10.0
+"""Side of the world, a square [m]."""
+
+FIRST_CAPACITY = 256
+"""Nodes that the planners' arrays have room for at first; they double it when they are full."""
+
+NODE_VISITS = 20_000_000
+"""Nodes that may be looked at in one repetition: bounds the number of slow queries."""
+
+REPETITIONS = 5
+
+
+def query_costs(kind: str, size: int, repetitions: int = REPETITIONS) -> NDArray[np.float64]:
+    """Time of a query in a tree whose nodes are spread evenly.
+
+    Args:
+        kind: ``grid``, ``kd-tree`` or ``brute-force``.
+        size: nodes of the tree.
+        repetitions: each on other nodes and with other queries.
+
+    Returns:
+        Mean time of a query in each repetition, shape (repetitions,) [s].
+    """
+    return np.array([query_cost(KINDS[kind], size, seed=seed) for seed in range(repetitions)])
+
+
+def query_cost(kind: int, size: int, spread: float = 1.0, most_queries: int = 100_000, seed: int = 0) -> float:
+    """Mean time of a query [s].
+
+    Args:
+        kind: of the index, a value of `KINDS`.
+        size: nodes of the tree.
+        spread: side of the nodes' area, as a share of the world's; queries come from the whole world.
+        most_queries: that are asked.
+        seed: of nodes and queries.
+    """
+    rng = np.random.default_rng(seed)
+    index = build_index(kind, spread * SIDE * rng.random((size, 2)))
+    visits = size if kind == BRUTE_FORCE or spread < 1.0 else 1
+    count = max(20, min(most_queries, NODE_VISITS // visits))
+    queries = SIDE * rng.random((count, 2))
+    stack = np.empty((2 * int(index.occupied[0]) + 64 if kind == KD_TREE else 0, 3))
+    answer(index, queries[:1], size, stack)
+    began = time.perf_counter()
+    answer(index, queries, size, stack)
+    return (time.perf_counter() - began) / count
+
+
+def build_index(kind: int, positions: NDArray[np.float64]) -> Index:
+    """An index of positions, shape (n, 2), with as many cells as a search would give it: one a node of its capacity."""
+    capacity = FIRST_CAPACITY
+    while capacity < len(positions):
+        capacity *= 2
+    cell = math.sqrt(SIDE * SIDE / capacity)
+    cells = math.ceil(SIDE / cell)
+    heads = np.full((cells, cells) if kind == GRID else (1, 1), -1, dtype=np.int32)
+    occupied = np.array([2**31, -1, 2**31, -1, 0] if kind == GRID else [0] * 5, dtype=np.int64)
+    states = np.zeros((capacity, 5))
+    states[: len(positions), :2] = positions
+    index = Index(kind, states, np.empty((capacity, 2), dtype=np.int32), heads, occupied, 0.0, 0.0, cell)
+    fill(index, len(positions))
+    return index
+
+
+@njit(cache=True)
+def fill(index: Index, count: int) -> None:
+    """Enter the first nodes, one after the other."""
+    for node in range(count):
+        insert(index, node)
+
+
+@njit(cache=True)
+def answer(index: Index, queries: NDArray[np.float64], count: int, stack: NDArray[np.float64]) -> float:
+    """Ask all queries, shape (m, 2); the sum of the distances keeps the compiler from leaving them out."""
+    total = 0.0
+    for i in range(len(queries)):
+        node = nearest(index, queries[i, 0], queries[i, 1], count, stack)
+        total += math.hypot(index.states[node, 0] - queries[i, 0], index.states[node, 1] - queries[i, 1])
+    return total

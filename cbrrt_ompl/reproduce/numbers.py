@@ -1,0 +1,57 @@
+"""Numbers as text: three digits, intervals in brackets, thousands with commas."""
+
+from __future__ import annotations
+
+import math
+
+from cbrrt_ompl.benchmark.statistics import Interval, Quartiles, Ratio
+from cbrrt_ompl.reproduce.outcomes import Sample, Share
+
+
+def number(value: float) -> str:
+    """Three significant digits; a dash for NaN."""
+    if not math.isfinite(value):
+        return "–" if math.isnan(value) else "∞"
+    if value == 0.0:
+        return "0"
+    digits = max(0, 2 - math.floor(math.log10(abs(value))))
+    return f"{value:,.{digits}f}" if abs(value) < 1000.0 else f"{float(f'{value:.3g}'):,.0f}"
+
+
+def whole(value: float) -> str:
+    """All digits of a whole number, such as a count of nodes."""
+    return f"{value:,.0f}" if math.isfinite(value) else number(value)
+
+
+def interval_text(interval: Interval, scale: float = 1.0) -> str:
+    """An interval in brackets."""
+    return f"[{number(scale * interval.low)}, {number(scale * interval.high)}]"
+
+
+def share_text(share: Share) -> str:
+    """A share in percent with Wilson's interval."""
+    if not share.of:
+        return "–"
+    low, high = share.interval
+    return f"{100.0 * share.value:.3g} % [{100.0 * low:.0f}, {100.0 * high:.0f}]"
+
+
+def count_text(share: Share) -> str:
+    """A share as "so many of so many"."""
+    return f"{share.count:,} of {share.of:,}" if share.of else "–"
+
+
+def median_text(sample: Sample, measure: str, scale: float = 1.0) -> str:
+    """Median with its 95 % interval."""
+    median = scale * sample.quartiles(measure).median
+    return f"{number(median)} {interval_text(sample.median_interval(measure), scale)}"
+
+
+def quartiles_text(found: Quartiles, scale: float = 1.0) -> str:
+    """Lower and upper quartile."""
+    return f"{number(scale * found.low)} to {number(scale * found.high)}"
+
+
+def ratio_text(ratio: Ratio) -> str:
+    """A ratio with its interval; a dash where there is none."""
+    return "–" if math.isnan(ratio.value) else f"{number(ratio.value)} {interval_text(ratio.interval)}"

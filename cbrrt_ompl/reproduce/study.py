@@ -1,0 +1,151 @@
+"""What is run: series of runs of one planner in one scene, and the parts in which processes run them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+from cbrrt_ompl.benchmark.campaign import run_seeds
+from cbrrt_ompl.reproduce.scenes import (
+    BRIEF_SHIFTS,
+    CASE_1,
+    CASE_2,
+    OTHERS,
+    READINGS,
+    ROOMS,
+    SHIFTS,
+    scenario_path,
+    shift_title,
+    with_gaps_moved,
+    with_settings,
+)
+from cbrrt_ompl.scenario import Scenario, load_scenario, scenario_to_dict
+
+NAIVE = "rrt-5d"
+"""OMPL's control::RRT with a metric over all five components of the state; in this study alone."""
+
+IN_OMPL = ("cb-rrt", "s-rrt")
+COMPILED = ("cb-rrt-compiled", "s-rrt-compiled")
+
+NEIGHBOURS = ("kd-tree", "brute-force")
+"""Other ways than the grid to find the nearest node."""
+
+SEED = 1
+"""Seed from which those of all runs are made."""
+
+RUNS_PER_PART = 25
+SLOW_RUNS_PER_PART = 1
+
+NAIVE_SHARE = 4
+"""One run in so many is made with `NAIVE`, which takes seconds."""
+
+
+class Key(NamedTuple):
+    """Which series it is."""
+
+    scene: str
+    """Name of the scenario file without its suffix."""
+    variant: str
+    """What is different from the scene as it is; empty for nothing."""
+    planner: str
+    """A planner of :func:`cbrrt_ompl.plan`, or `NAIVE`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """Runs of one planner in one scene, each with a seed of its own."""
+
+    key: Key
+    scenario: Scenario
+    """The scene, with what the variant changes."""
+    runs: int
+    """How many."""
+
+    @cached_property
+    def data(self) -> dict[str, Any]:
+        """The scenario as plain values, with all its obstacles."""
+        return scenario_to_dict(replace(self.scenario, map=None))
+
+    @cached_property
+    def seeds(self) -> tuple[int, ...]:
+        """Seed of each run; the first ones stay the same whatever the number of runs."""
+        return run_seeds(SEED, f"{self.key.scene} {self.key.variant}", self.key.planner, self.runs)
+
+    def digest(self, place: str) -> str:
+        """What the results depend on, in short.
+
+        Args:
+            place: version of the package and the machine.
+        """
+        text = json.dumps([place, self.key.planner, self.data], sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+@dataclass(frozen=True)
+class Part:
+    """Some runs of a series: what a process is given to do."""
+
+    key: Key
+    scenario: dict[str, Any]
+    """The scenario as plain values."""
+    seeds: tuple[int, ...]
+    """Seed of each run."""
+
+
+def make_study(runs: int, brief: bool = False) -> list[Series]:
+    """All series of the report.
+
+    Args:
+        runs: of each series.
+        brief: the paper's tables and a few moved gaps only.
+    """
+    scenes = {name: load_scenario(scenario_path(name)) for name in (CASE_1, CASE_2, ROOMS, *OTHERS)}
+    series = [
+        Series(Key(scene, "", planner), scenes[scene], runs)
+        for scene in ((CASE_1, CASE_2) if brief else (CASE_1, CASE_2, ROOMS))
+        for planner in (*IN_OMPL, *COMPILED)
+    ]
+    for offset in BRIEF_SHIFTS if brief else SHIFTS:
+        for scene in (CASE_1, CASE_2):
+            moved = with_gaps_moved(scenes[scene], offset)
+            series += [Series(Key(scene, shift_title(offset), planner), moved, runs) for planner in COMPILED]
+    if not brief:
+        series += _full(scenes, runs)
+    return series
+
+
+def study_size(runs: int, brief: bool = False) -> int:
+    """Runs in all, for as many of each series."""
+    return sum(series.runs for series in make_study(runs, brief))
+
+
+def _full(scenes: dict[str, Scenario], runs: int) -> Iterator[Series]:
+    """What the short report leaves out."""
+    for scene in OTHERS:
+        yield from (Series(Key(scene, "", planner), scenes[scene], runs) for planner in COMPILED)
+    for scene in (CASE_1, CASE_2):
+        for kind in NEIGHBOURS:
+            scenario = with_settings(scenes[scene], {"nearest_neighbour": kind})
+            yield Series(Key(scene, kind, "cb-rrt-compiled"), scenario, runs)
+        yield Series(Key(scene, "", "rrt"), scenes[scene], max(1, runs // NAIVE_SHARE))
+        yield Series(Key(scene, "", NAIVE), scenes[scene], max(1, runs // NAIVE_SHARE))
+    for reading in READINGS:
+        for scene in (CASE_1, CASE_2, ROOMS):
+            scenario = with_settings(scenes[scene], reading.changes)
+            yield from (Series(Key(scene, reading.title, planner), scenario, runs) for planner in COMPILED)
+
+
+def parts_of(series: Series, seeds: tuple[int, ...]) -> Iterator[Part]:
+    """Some runs of a series, cut into parts.
+
+    Args:
+        series: the series.
+        seeds: those of its seeds that are to be run.
+    """
+    size = SLOW_RUNS_PER_PART if series.key.planner == NAIVE else RUNS_PER_PART
+    for first in range(0, len(seeds), size):
+        yield Part(series.key, series.data, seeds[first : first + size])
