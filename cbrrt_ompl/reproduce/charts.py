@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
+from matplotlib.legend_handler import HandlerPolyCollection
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from cbrrt_ompl.benchmark.charts import COLORS
 from cbrrt_ompl.benchmark.statistics import quartiles
@@ -250,20 +255,19 @@ def _once(ax: Axes, label: str) -> str | None:
 
 def _legend_below(figure: Figure) -> None:
     """One legend for all axes, below them."""
-    shown = {}
+    shown: dict[str, Artist] = {}
     for ax in figure.axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             shown.setdefault(label, handle)
+    style: dict[str, Any] = {"fontsize": 8, "frameon": False, "columnspacing": 1.2, "handlelength": 1.6}
     figure.legend(
-        list(shown.values()), list(shown), loc="outside lower center", ncols=min(len(shown), 7), fontsize=8,
-        frameon=False, columnspacing=1.2, handlelength=1.6,
+        shown.values(), shown.keys(), loc="outside lower center", ncols=min(len(shown), 7),
+        handler_map={PathCollection: HandlerPolyCollection()}, **style,
     )  # fmt: skip
 
 
 def _plain_ticks(ax: Axes, axis: str = "x") -> None:
     """Write the ticks of a logarithmic axis as plain numbers."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
     one = ax.xaxis if axis == "x" else ax.yaxis
     low, high = one.get_view_interval()
     decades = math.log10(high / low)

@@ -193,8 +193,8 @@ def _typical(outcomes: Outcomes, planner: str, text: str) -> Claim:
         findings += _each(outcomes, planner, (scene,), ask, [Place(scene, variant) for variant in shifts])
     return Claim(
         f"The published number of nodes is typical ({text}).",
-        f"Share of runs that need no more nodes than published: yes if its interval lies between {100 * TYPICAL[0]:.0f} % "
-        f"and {100 * TYPICAL[1]:.0f} %, no if outside.",
+        "Share of runs that need no more nodes than published: yes if its interval lies between "
+        f"{100 * TYPICAL[0]:.0f} % and {100 * TYPICAL[1]:.0f} %, no if outside.",
         tuple(findings),
         "Our scenes were reconstructed so that it is: a yes in them is no evidence for the paper, the moved gaps are.",
     )
@@ -208,8 +208,8 @@ def _no_smoothing(outcomes: Outcomes) -> Claim:
     found = _each(outcomes, "cb-rrt", (CASE_1, CASE_2), ask, others)
     return Claim(
         "CB-RRT's trajectories keep all limits and need no smoothing.",
-        "Yes if every trajectory passes `verify` (limits of velocity and acceleration, motion, collisions, goal), no if "
-        "one does not; open without any trajectory.",
+        "Yes if every trajectory passes `verify` (limits of velocity and acceleration, motion, collisions, goal), no "
+        "if one does not; open without any trajectory.",
         tuple(f for f in found if f.in_paper or f.answer is not Answer.OPEN),
     )
 
@@ -273,8 +273,8 @@ def _plane(outcomes: Outcomes) -> Claim:
                 )
     return Claim(
         "Searching the plane with a control law beats a naive RRT in all five dimensions.",
-        "Ratio of the medians of nodes and of time, naive RRT over CB-RRT, both in OMPL: yes if its interval lies above "
-        "1, no if below.",
+        "Ratio of the medians of nodes and of time, naive RRT over CB-RRT, both in OMPL: yes if its interval lies "
+        "above 1, no if below.",
         tuple(findings),
     )
 
@@ -290,8 +290,8 @@ def _tree_pays(outcomes: Outcomes) -> Claim:
             )
     return Claim(
         "A k-d tree makes planning faster than brute force.",
-        "Ratio of the median planning times of the compiled CB-RRT, brute force over k-d tree: yes if its interval lies "
-        "above 1, no if below.",
+        "Ratio of the median planning times of the compiled CB-RRT, brute force over k-d tree: yes if its interval "
+        "lies above 1, no if below.",
         tuple(findings),
     )
 
@@ -322,8 +322,8 @@ def _grids(grids: Sequence[GridStudy]) -> Claim:
 
     return Claim(
         "Grids of 0.1 m to 0.2 m cannot be used where passages are 0.2 m wide.",
-        "Yes if no grid, wherever it is placed, has a path; no if one has. A cell is free if its centre is, or, as in an "
-        "occupancy grid, if all of it is.",
+        "Yes if no grid, wherever it is placed, has a path; no if one has. A cell is free if its centre is, or, as in "
+        "an occupancy grid, if all of it is.",
         tuple(findings()),
         "The paths are polylines: the robot has to stop and turn at each corner.",
     )

@@ -11,6 +11,9 @@ from typing import TypeAlias
 
 from cbrrt_ompl.reproduce.verdicts import Answer, Claim, Verdict
 
+PIXEL_RATIO = 1.5
+"""Pixels of a picture for one of the page."""
+
 
 @dataclass(frozen=True)
 class Heading:
@@ -158,7 +161,8 @@ def _html(block: Block) -> Iterator[str]:
         case Picture(_, png, caption):
             data = base64.b64encode(png).decode()
             text = html.escape(caption)
-            image = f'<img alt="{text}" src="data:image/png;base64,{data}">'
+            width = round(int.from_bytes(png[16:20], "big") / PIXEL_RATIO)
+            image = f'<img alt="{text}" width="{width}" src="data:image/png;base64,{data}">'
             yield f'<figure><div tabindex="0">{image}</div><figcaption>{text}</figcaption></figure>'
         case Summary(claims):
             yield '<div class="claims">'
@@ -242,7 +246,7 @@ body {
   margin: 0; background: var(--back); color: var(--text);
   font: 16px/1.55 system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif;
 }
-main { max-width: 64rem; margin: 0 auto; padding: 1.5rem 1.1rem 4rem; }
+main { max-width: 70rem; margin: 0 auto; padding: 1.5rem 1.1rem 4rem; }
 h1 { font-size: clamp(1.5rem, 5vw, 2.2rem); line-height: 1.2; margin: 0.6rem 0 1rem; }
 h2 { font-size: 1.35rem; margin: 2.6rem 0 0.8rem; padding-top: 0.9rem; border-top: 1px solid var(--line); }
 h3 { font-size: 1rem; line-height: 1.35; margin: 0.5rem 0 0.35rem; }
@@ -250,16 +254,16 @@ p { margin: 0.7rem 0; max-width: 46rem; overflow-wrap: anywhere; }
 code { font: 0.88em ui-monospace, "DejaVu Sans Mono", Menlo, Consolas, monospace; overflow-wrap: anywhere; }
 .table { overflow-x: auto; margin: 1rem 0; border: 1px solid var(--line); border-radius: 8px; background: var(--card); }
 table { border-collapse: collapse; width: 100%; font-size: 0.88rem; font-variant-numeric: tabular-nums; }
-th, td { padding: 0.42rem 0.75rem; text-align: left; white-space: nowrap; border-top: 1px solid var(--line); }
-thead th { background: var(--head); border-top: 0; font-weight: 600; }
+th, td { padding: 0.42rem 0.6rem; text-align: left; white-space: nowrap; border-top: 1px solid var(--line); }
+thead th { background: var(--head); border-top: 0; font-weight: 600; white-space: normal; vertical-align: bottom; }
 th.r, td.r { text-align: right; }
 figure {
   margin: 1.4rem 0; padding: 0.6rem; background: #fff; border: 1px solid var(--line); border-radius: 8px;
   text-align: center;
 }
 figure div { overflow-x: auto; }
-figure img { max-width: 100%; min-width: min(30rem, 100%); height: auto; }
-@media (max-width: 34rem) { figure img { min-width: 34rem; } }
+figure img { max-width: 100%; height: auto; }
+@media (max-width: 34rem) { figure img { max-width: none; width: 34rem; } }
 figcaption { color: #4d565d; font-size: 0.88rem; padding: 0.35rem 0.3rem 0.1rem; }
 .claims { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 27rem), 1fr)); gap: 0.8rem; }
 .claim { background: var(--card); border: 1px solid var(--line); border-radius: 8px; padding: 0.8rem 1rem; }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import shapely
@@ -141,8 +142,8 @@ def _free(centres: NDArray[np.float64], cell: float, rule: str, solid: shapely.G
     return ~np.asarray(shapely.intersects(solid, shapely.box(x - half, y - half, x + half, y + half)))
 
 
-def _graph(centres: NDArray[np.float64], free: NDArray[np.bool_], solid: shapely.Geometry) -> csr_array:
-    """Which cells are joined, and how far apart their centres are."""
+def _graph(centres: NDArray[np.float64], free: NDArray[np.bool_], solid: shapely.Geometry) -> Any:
+    """Which cells are joined, and how far apart their centres are, as a sparse matrix."""
     nx, ny = free.shape
     number = np.arange(nx * ny).reshape(nx, ny)
     rows, columns, lengths = [], [], []
@@ -158,7 +159,7 @@ def _graph(centres: NDArray[np.float64], free: NDArray[np.bool_], solid: shapely
     row, column, length = map(np.concatenate, (rows, columns, lengths))
     size = nx * ny
     half = csr_array((length, (row, column)), shape=(size, size))
-    return csr_array(half + half.T)
+    return half + half.T
 
 
 def _corners(points: NDArray[np.float64]) -> NDArray[np.float64]:

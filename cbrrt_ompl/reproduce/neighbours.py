@@ -1,4 +1,4 @@
-"""What a nearest-neighbour query costs the compiled planners: grid, k-d tree and brute force, by the number of nodes."""
+"""What a nearest-neighbour query costs the compiled planners by the number of nodes: grid, k-d tree, brute force."""
 
 from __future__ import annotations
 

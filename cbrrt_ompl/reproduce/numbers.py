@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from cbrrt_ompl.benchmark.statistics import Interval, Quartiles, Ratio
 from cbrrt_ompl.reproduce.outcomes import Sample, Share
@@ -23,9 +24,9 @@ def whole(value: float) -> str:
     return f"{value:,.0f}" if math.isfinite(value) else number(value)
 
 
-def interval_text(interval: Interval, scale: float = 1.0) -> str:
+def interval_text(interval: Interval, scale: float = 1.0, text: Callable[[float], str] = number) -> str:
     """An interval in brackets."""
-    return f"[{number(scale * interval.low)}, {number(scale * interval.high)}]"
+    return f"[{text(scale * interval.low)}, {text(scale * interval.high)}]"
 
 
 def share_text(share: Share) -> str:
@@ -43,15 +44,22 @@ def count_text(share: Share) -> str:
 
 def median_text(sample: Sample, measure: str, scale: float = 1.0) -> str:
     """Median with its 95 % interval."""
-    median = scale * sample.quartiles(measure).median
-    return f"{number(median)} {interval_text(sample.median_interval(measure), scale)}"
+    median, interval = scale * sample.quartiles(measure).median, sample.median_interval(measure)
+    if math.isinf(interval.low):
+        return number(median)
+    text = whole if measure == "nodes" else number
+    return f"{text(median)} {interval_text(interval, scale, text)}"
 
 
 def quartiles_text(found: Quartiles, scale: float = 1.0) -> str:
     """Lower and upper quartile."""
+    if math.isinf(found.low):
+        return number(found.low)
     return f"{number(scale * found.low)} to {number(scale * found.high)}"
 
 
 def ratio_text(ratio: Ratio) -> str:
     """A ratio with its interval; a dash where there is none."""
-    return "–" if math.isnan(ratio.value) else f"{number(ratio.value)} {interval_text(ratio.interval)}"
+    if math.isnan(ratio.value) or math.isinf(ratio.interval.low):
+        return number(ratio.value)
+    return f"{number(ratio.value)} {interval_text(ratio.interval)}"

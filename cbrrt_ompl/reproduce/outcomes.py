@@ -22,6 +22,9 @@ from cbrrt_ompl.benchmark.statistics import (
 from cbrrt_ompl.reproduce.measuring import Run
 from cbrrt_ompl.reproduce.study import Key
 
+FEWEST = 6
+"""Runs from which on their smallest and largest value enclose the true median in 95 % of all samples."""
+
 
 @dataclass(frozen=True)
 class Share:
@@ -93,7 +96,9 @@ class Sample:
         return bootstrap_medians(self.values(measure), " ".join((*self.key, measure)))
 
     def median_interval(self, measure: str) -> Interval:
-        """95 % bootstrap interval of the median."""
+        """95 % bootstrap interval of the median; from 0 to infinity for less than `FEWEST` runs."""
+        if len(self) < FEWEST:
+            return Interval(0.0, math.inf)
         low, high = np.quantile(self.medians(measure), (0.025, 0.975), method="inverted_cdf")
         return Interval(float(low), float(high))
 
@@ -115,7 +120,7 @@ class Outcomes:
 
     def variants(self, scene: str) -> list[str]:
         """The variants of a scene, without the scene as it is."""
-        return [key.variant for key in self._samples if key.scene == scene and key.variant]
+        return list(dict.fromkeys(key.variant for key in self._samples if key.scene == scene and key.variant))
 
     @property
     def total(self) -> int:
@@ -124,6 +129,12 @@ class Outcomes:
 
 
 def ratio_between(above: Sample, below: Sample, measure: str) -> Ratio:
-    """How many times the median of one sample is that of another, with its 95 % bootstrap interval."""
+    """How many times the median of one sample is that of another, with its 95 % bootstrap interval.
+
+    The interval goes from 0 to infinity if one of them has less than `FEWEST` runs.
+    """
     values, reference = above.values(measure), below.values(measure)
-    return ratio_of_medians(values, reference, above.medians(measure), below.medians(measure))
+    ratio = ratio_of_medians(values, reference, above.medians(measure), below.medians(measure))
+    if min(len(above), len(below)) < FEWEST and not math.isnan(ratio.value):
+        return Ratio(ratio.value, Interval(0.0, math.inf))
+    return ratio

@@ -118,8 +118,8 @@ def _tables(material: Material) -> Iterator[Block]:
             if (sample := material.sample(scene, planner)) is not None
         ]
         header = (
-            "scene", "planner", "runs", "solved within 50,000 samples", "nodes: median", "nodes: quartiles",
-            "nodes, paper", "time [ms]: median", "time [ms]: quartiles", "time [ms], paper",
+            "scene", "planner", "runs", "solved", "nodes: median", "nodes: quartiles", "nodes: paper",
+            "time [ms]: median", "time [ms]: quartiles", "time [ms]: paper",
         )  # fmt: skip
         yield Text(f"**{table}**")
         yield Table(header, rows, left=2)
@@ -197,7 +197,7 @@ def _shifts(material: Material) -> Iterator[Block]:
         for offset in offsets:
             cb, s = (material.sample(scene, planner, shift_title(offset) if offset else "") for planner in COMPILED)
             if cb is not None and s is not None:
-                name = shift_title(offset) if offset else "as it is"
+                name = f"{100 * offset:+.0f} cm" if offset else "as they are"
                 rows.append((title_of(scene), name, *_both(cb, s)))
     yield Table(("scene", "gaps", *_BOTH), rows, left=2)
     yield _picture(
@@ -208,12 +208,12 @@ def _shifts(material: Material) -> Iterator[Block]:
 
 
 _BOTH = (
-    "CB-RRT solved",
-    "S-RRT solved",
-    "CB-RRT nodes",
-    "S-RRT nodes",
-    "nodes, S-RRT / CB-RRT",
-    "time, S-RRT / CB-RRT",
+    "CB-RRT: solved",
+    "S-RRT: solved",
+    "CB-RRT: nodes",
+    "S-RRT: nodes",
+    "nodes: S / CB",
+    "time: S / CB",
 )
 """Columns of :func:`_both`."""
 
