@@ -122,7 +122,7 @@ def shortest_path(
     start = int(np.argmin(np.hypot(*(flat - (scenario.start.x, scenario.start.y)).T)))
     goals = np.flatnonzero(np.hypot(*(flat - (scenario.goal.x, scenario.goal.y)).T) <= scenario.goal.tolerance)
     began = time.perf_counter()
-    distances, before = dijkstra(graph, indices=start, return_predecessors=True)
+    (distances,), (before,) = dijkstra(graph, indices=[start], return_predecessors=True)
     search_time = time.perf_counter() - began
     if not len(goals) or math.isinf(distances[goals].min()):
         return None

@@ -125,8 +125,8 @@ def _tables(material: Material) -> Iterator[Block]:
         yield Table(header, rows, left=2)
     yield Text(
         "In brackets: 95 % intervals. A run that needs more than 50,000 samples has failed, and counts as infinite in "
-        "medians and quartiles. Planners without the suffix `-compiled` run in OMPL's `control::RRT`. Times are those of "
-        f"the search alone, on another computer than the paper's ({PROCESSOR})."
+        "medians and quartiles. Planners without the suffix `-compiled` run in OMPL's `control::RRT`. Times are those "
+        f"of the search alone, on another computer than the paper's ({PROCESSOR})."
     )
     rows = []
     for name, (cb, s) in (("in OMPL", IN_OMPL), ("compiled", COMPILED)):
@@ -274,8 +274,8 @@ def _readings(material: Material) -> Iterator[Block]:
         "Where the paper is silent, something had to be chosen: the law is evaluated once an extension, the reference "
         "lies at most 2 m away, the horizon is 2 s (with another one, the reference lies at most as far away as full "
         "speed leads), a control within 0.1 m/s and 0.1 rad/s of a sister's is refused, there is no goal bias, and an "
-        "extension that meets an obstacle is discarded. The table has median nodes of the compiled planners under other "
-        "choices, one at a time, and the share of solved runs where it is not 100 %. S-RRT has no law and no refusal "
+        "extension that meets an obstacle is discarded. The table has median nodes of the compiled planners under "
+        "other choices, one at a time, and the share of solved runs where it is not 100 %. S-RRT has no law and no refusal "
         "within a tolerance: where its numbers differ there, that is chance."
     )
     yield Table(("reading", *(title for _, _, title in series)), rows)
@@ -361,8 +361,8 @@ def _limits(material: Material) -> Iterator[Block]:
     yield Text(
         "`verify` computes each motion again from its commands, by code that shares nothing with the planners: limits, "
         "collisions by FCL, start and goal. S-RRT's trajectories are verified as kinematic ones, whose velocities may "
-        "jump; what these jumps ask for is in the column of the acceleration limits. OMPL's own planners check the ends "
-        "of their steps alone, so that some of their trajectories cut corners: such runs count as failed."
+        "jump; what these jumps ask for is in the column of the acceleration limits. OMPL's own planners check the "
+        "ends of their steps alone, so that some of their trajectories cut corners: such runs count as failed."
     )
 
 
@@ -372,8 +372,8 @@ def _grids(material: Material, plans: Mapping[tuple[str, str], PlanResult]) -> I
         return
     yield Heading("A* on a grid")
     yield Text(
-        "The shortest path on a grid of eight neighbours, by scipy's Dijkstra, which finds what A* finds. Two neighbours "
-        "are joined where the straight line between their centres is free. How a grid lies in the scene matters, so it "
+        "The shortest path on a grid of eight neighbours, by scipy's Dijkstra, which finds what A* finds. Two "
+        "neighbours are joined where the straight line between their centres is free. How a grid lies in the scene matters, so it "
         "was placed in many ways. Medians over the grids with a path; of equally short paths the search returns any, "
         "and their corners differ. Driving time: at each corner the robot brakes to rest, turns in place and starts "
         "again, under the same limits as the planners."

@@ -33,7 +33,7 @@ class Verdict(Enum):
 MEANINGS = {
     Verdict.HOLDS: "yes in every scene of the paper, and everywhere else that it was tested",
     Verdict.HOLDS_THERE: "yes in every scene of the paper; elsewhere never no, but too few runs to tell in some",
-    Verdict.ONLY_THERE: "yes in every scene of the paper, no in at least one other: moved gaps, other readings or scenes",
+    Verdict.ONLY_THERE: "yes in every scene of the paper, no in another one: moved gaps, other readings or scenes",
     Verdict.FAILS: "no in at least one scene of the paper",
     Verdict.OPEN: "never no in the paper's scenes, but too few runs to tell in at least one of them",
 }
