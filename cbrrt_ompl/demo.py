@@ -1,4 +1,4 @@
-"""The demonstration: both planners of the paper on its two scenes, beside the published numbers."""
+"""The demonstration: a run of both planners of the paper on its two scenes, beside the published numbers."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 from matplotlib.figure import Figure
 
 from cbrrt_ompl.figures import draw_plan, draw_velocities
 from cbrrt_ompl.planning import PlanResult, plan
+from cbrrt_ompl.reproduce.published import PAPER, Published
 from cbrrt_ompl.scenario import Scenario, load_scenario, scenario_path
 from cbrrt_ompl.verification import verify
 
@@ -22,26 +23,12 @@ TIME_LIMIT = 300.0
 WARM_UP = 0.01
 """Planning time of a run before the measured ones, which makes most of the clearance map [s]."""
 
+REPRODUCTION_RUNS = 8
+"""Runs of each planner in each scene of the short report at the end."""
+
 Watch: TypeAlias = Callable[[int, str], AbstractContextManager[Callable[[int, float], None] | None]]
 """Makes the progress report of one run from its number of samples at most and its name."""
 
-
-class Published(NamedTuple):
-    """What the paper reports of its one run."""
-
-    nodes: int | None
-    """Nodes of the tree; None where the planner failed."""
-    milliseconds: float | None
-    """Planning time [ms]; None where the planner failed."""
-
-
-PAPER = {
-    ("paper_case1", "cb-rrt"): Published(228, 7.75),
-    ("paper_case1", "s-rrt"): Published(658, 15.0),
-    ("paper_case2", "cb-rrt"): Published(1391, 16.0),
-    ("paper_case2", "s-rrt"): Published(None, None),
-}
-"""The paper's results by scene and planner, in the order in which they are run: in OMPL, then compiled."""
 
 COLUMNS = (
     "scene",

@@ -19,7 +19,7 @@ from cbrrt_ompl.scenario import load_scenario
 from cbrrt_ompl.trajectory import Trajectory
 from cbrrt_ompl.verification import verify
 
-COMMANDS = ("plan", "verify", "show", "planners", "demo", "bench", "report", "completion")
+COMMANDS = ("plan", "verify", "show", "planners", "demo", "bench", "report", "reproduce", "completion")
 
 OPEN = """
 name: open
@@ -424,16 +424,19 @@ def test_the_demo_writes_figures_trajectories_and_table(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(demo, "PAPER", {key: demo.PAPER[key] for key in demo.PAPER if key != ("paper_case2", "s-rrt")})
+    monkeypatch.setattr(demo, "REPRODUCTION_RUNS", 1)
     output = tmp_path / "new" / "demo"
     assert main(["demo", "--output", str(output)]) == 0
     out = capsys.readouterr().out
     assert out.count(" valid ") == 6
-    assert max(map(len, out.splitlines()[:-1])) <= 80  # the last line has the folder's path
+    assert all(len(line) <= 80 for line in out.replace(str(output), "demo").splitlines())
+    assert out.splitlines()[-1].endswith(f"runs: {output / 'report.html'}")
     in_ompl = ["paper_case1_cb-rrt", "paper_case1_s-rrt", "paper_case2_cb-rrt"]
     stems = [stem + suffix for stem in in_ompl for suffix in ("", "-compiled")]
     names = {f"{stem}{suffix}" for stem in stems for suffix in (".csv", ".png")}
     names |= {"paper_case1.yaml", "paper_case2.yaml", "results.md"}
     names |= {"paper_case2_cb-rrt_velocities.png", "paper_case2_cb-rrt-compiled_velocities.png"}
+    names |= {"report.html", "report.md", "runs.jsonl", "figures", ".lock"}
     assert {path.name for path in output.iterdir()} == names
     assert (output / "results.md").read_text(encoding="utf-8").count("| paper_case") == 6
 

@@ -48,7 +48,7 @@ def typical_plan(sample: Sample, scenario: Scenario) -> PlanResult:
 def scenes_figure(scenarios: Mapping[str, Scenario]) -> Figure:
     """Fig. 3: the two scenes side by side."""
     figure = _figure(8.6, 4.7)
-    for ax, (name, scenario) in zip(figure.subplots(1, len(scenarios)), scenarios.items(), strict=True):
+    for ax, (name, scenario) in zip(np.atleast_1d(figure.subplots(1, len(scenarios))), scenarios.items(), strict=True):
         draw_scene(ax, scenario)
         ax.set_title(title_of(name))
     _legend_below(figure)
@@ -58,7 +58,7 @@ def scenes_figure(scenarios: Mapping[str, Scenario]) -> Figure:
 def trees_figure(results: Sequence[PlanResult], scenario: Scenario) -> Figure:
     """Fig. 4: trees and paths of both planners in one scene, side by side."""
     figure = _figure(8.6, 4.9)
-    for ax, result in zip(figure.subplots(1, len(results)), results, strict=True):
+    for ax, result in zip(np.atleast_1d(figure.subplots(1, len(results))), results, strict=True):
         _draw_result(ax, result, scenario)
         ax.set_title(f"{NAMES[result.planner]}: {result.nodes:,} nodes")
     _legend_below(figure)

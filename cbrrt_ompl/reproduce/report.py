@@ -275,8 +275,8 @@ def _readings(material: Material) -> Iterator[Block]:
         "lies at most 2 m away, the horizon is 2 s (with another one, the reference lies at most as far away as full "
         "speed leads), a control within 0.1 m/s and 0.1 rad/s of a sister's is refused, there is no goal bias, and an "
         "extension that meets an obstacle is discarded. The table has median nodes of the compiled planners under "
-        "other choices, one at a time, and the share of solved runs where it is not 100 %. S-RRT has no law and no refusal "
-        "within a tolerance: where its numbers differ there, that is chance."
+        "other choices, one at a time, and the share of solved runs where it is not 100 %. S-RRT has no law and no "
+        "refusal within a tolerance: where its numbers differ there, that is chance."
     )
     yield Table(("reading", *(title for _, _, title in series)), rows)
     if ratios:
@@ -373,10 +373,10 @@ def _grids(material: Material, plans: Mapping[tuple[str, str], PlanResult]) -> I
     yield Heading("A* on a grid")
     yield Text(
         "The shortest path on a grid of eight neighbours, by scipy's Dijkstra, which finds what A* finds. Two "
-        "neighbours are joined where the straight line between their centres is free. How a grid lies in the scene matters, so it "
-        "was placed in many ways. Medians over the grids with a path; of equally short paths the search returns any, "
-        "and their corners differ. Driving time: at each corner the robot brakes to rest, turns in place and starts "
-        "again, under the same limits as the planners."
+        "neighbours are joined where the straight line between their centres is free. How a grid lies in the scene "
+        "matters, so it was placed in many ways. Medians over the grids with a path; of equally short paths the search "
+        "returns any, and their corners differ. Driving time: at each corner the robot brakes to rest, turns in place "
+        "and starts again, under the same limits as the planners."
     )
     rows = []
     for grid in material.grids:

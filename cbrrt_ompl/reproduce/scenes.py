@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from cbrrt_ompl.errors import MISSING, Problem, ScenarioError, WorldError
+from cbrrt_ompl.errors import Problem, WorldError
 from cbrrt_ompl.obstacles import Box
 from cbrrt_ompl.scenario import Scenario
 from cbrrt_ompl.world import World
@@ -64,23 +63,6 @@ def title_of(scene: str) -> str:
 def shift_title(offset: float) -> str:
     """What the report calls gaps that are moved by an offset [m]."""
     return f"gaps {100.0 * offset:+.0f} cm"
-
-
-def scenario_path(name: str) -> Path:
-    """The file of a scenario that comes with the package, in a checkout or in an installed wheel.
-
-    Args:
-        name: name of the file without its suffix.
-
-    Raises:
-        ScenarioError: if there is no such file.
-    """
-    package = Path(__file__).resolve().parents[1]
-    for folder in (package, package.parent):
-        path = folder / "scenarios" / f"{name}.yaml"
-        if path.is_file():
-            return path
-    raise ScenarioError(Problem("", MISSING, "a scenario that comes with the package"), f"{name}.yaml")
 
 
 def with_gaps_moved(scenario: Scenario, offset: float) -> Scenario:

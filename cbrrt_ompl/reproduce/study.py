@@ -18,7 +18,6 @@ from cbrrt_ompl.reproduce.scenes import (
     READINGS,
     ROOMS,
     SHIFTS,
-    scenario_path,
     shift_title,
     with_gaps_moved,
     with_settings,
@@ -106,7 +105,7 @@ def make_study(runs: int, brief: bool = False) -> list[Series]:
         runs: of each series.
         brief: the paper's tables and a few moved gaps only.
     """
-    scenes = {name: load_scenario(scenario_path(name)) for name in (CASE_1, CASE_2, ROOMS, *OTHERS)}
+    scenes = {name: load_scenario(name) for name in (CASE_1, CASE_2, ROOMS, *OTHERS)}
     series = [
         Series(Key(scene, "", planner), scenes[scene], runs)
         for scene in ((CASE_1, CASE_2) if brief else (CASE_1, CASE_2, ROOMS))
