@@ -67,7 +67,7 @@ def test_the_commands_exist(readme: str, repository: Path) -> None:
             assert callable(build_parser().parse_args(arguments).run)
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/architecture.md"])
+@pytest.mark.parametrize("page", ["README.md", "docs/architecture.md", "docs/reproduction.md"])
 def test_local_links_lead_to_files(repository: Path, page: str) -> None:
     text = (repository / page).read_text(encoding="utf-8")
     for target in re.findall(r"\]\(([^)#]+)\)", text):

@@ -370,6 +370,8 @@ def test_an_interrupted_reproduction_goes_on_and_its_page_needs_no_other_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(reproduction, "make_study", small_study)
+    monkeypatch.setattr(reproduction, "QUERY_SIZES", (228,))
+    monkeypatch.setattr(reproduction, "PLACES", 1)
     output = tmp_path / "new" / "report"
     first = reproduce(output, runs=2, jobs=1)
     assert (first.runs, first.kept, first.failures) == (8, 0, {})
