@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 
 .PHONY: help demo test docs clean
 help:
-	@echo "make demo   install into $(VENV) and plan the paper's scenes and measure it again, in short"
+	@echo "make demo   install into $(VENV) and plan both scenes of the paper and measure it again, in short"
 	@echo "make test   install into $(VENV) and run every check: ruff, mypy, import-linter, pytest"
 	@echo "make docs   install into $(VENV) and build the pages of docs/ into site/, without a warning"
 	@echo "make clean  remove $(VENV), demo/, site/ and all caches"

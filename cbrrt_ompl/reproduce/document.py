@@ -102,8 +102,8 @@ def strongest(claim: Claim) -> list[str]:
         more = f"; and {len(against) - 3} more" if len(against) > 3 else ""
         lines.append(f"No in {len(against)} of {others} other places: {named}{more}")
     elif others:
-        yes = sum(not finding.in_paper and finding.answer is Answer.YES for finding in claim.findings)
-        lines.append(f"Yes in {yes} of {others} other places")
+        unclear = sum(not finding.in_paper and finding.answer is Answer.OPEN for finding in claim.findings)
+        lines.append(f"Yes in {others - unclear} of {others} other places{', open in the rest' if unclear else ''}")
     return lines
 
 

@@ -30,7 +30,7 @@ PICTURES = "figures"
 QUERY_SIZES = (*TREE_SIZES, 10_000, 50_000)
 """Trees in which queries are timed: the published ones, and larger ones up to the number of samples."""
 
-BRIEF_PLACES = 3
+BRIEF_PLACES = 4
 """Places of a grid along each axis in the short report."""
 
 

@@ -8,7 +8,7 @@ from enum import Enum
 
 from cbrrt_ompl.benchmark.statistics import Interval
 
-MOST = 0.75
+MOST = 2.0 / 3.0
 """Share that counts as "solves it", "fails" or "most of them"."""
 
 
