@@ -376,8 +376,8 @@ def _grids(material: Material, plans: Mapping[tuple[str, str], PlanResult]) -> I
         "neighbours are joined where the straight line between their centres is free. How a grid lies in the scene "
         "matters, so it was placed in many ways; a whole cell of 0.2 m fits a gap of 0.2 m only where it lies in it "
         "exactly. Medians over the grids with a path; of equally short paths the search returns any, and their corners "
-        "differ. Driving time: at each corner the robot brakes to rest, turns in place and starts again, under the same "
-        "limits as the planners."
+        "differ. Driving time: at each corner the robot brakes to rest, turns in place and starts again, under the "
+        "same limits as the planners."
     )
     rows = []
     for grid in material.grids:
