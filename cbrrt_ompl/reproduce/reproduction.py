@@ -20,7 +20,7 @@ from cbrrt_ompl.reproduce.published import TREE_SIZES
 from cbrrt_ompl.reproduce.report import Material, make_report
 from cbrrt_ompl.reproduce.scenes import CASE_1, CASE_2
 from cbrrt_ompl.reproduce.store import Store, locked
-from cbrrt_ompl.reproduce.study import NAIVE, Part, Series, make_study, parts_of
+from cbrrt_ompl.reproduce.study import Part, Series, make_study, parts_of
 from cbrrt_ompl.reproduce.verdicts import Claim
 from cbrrt_ompl.scenario import Scenario
 
@@ -128,10 +128,9 @@ def _run(
     """Run what is missing; the number of runs that were there, and what went wrong by the name of the series."""
     digests = {series.key: series.digest(_place()) for series in study}
     parts: list[Part] = []
-    for series in study:
+    for series in sorted(study, key=lambda series: not series.slow):  # the slow ones first
         there = store.runs(digests[series.key])
         parts += parts_of(series, tuple(seed for seed in series.seeds if seed not in there))
-    parts.sort(key=lambda part: part.key.planner != NAIVE)  # the slow ones first
     kept = done = sum(series.runs for series in study) - sum(len(part.seeds) for part in parts)
     failures: dict[str, str] = {}
     progress(done)

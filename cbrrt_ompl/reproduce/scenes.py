@@ -38,6 +38,8 @@ class Reading(NamedTuple):
     """What is different, for tables."""
     changes: Mapping[str, Any]
     """Settings of the planners that differ from ours."""
+    slow_with: tuple[str, ...] = ()
+    """Planners that take seconds to fail under it."""
 
 
 READINGS = (
@@ -50,7 +52,7 @@ READINGS = (
     Reading("no control refused", MappingProxyType({"equal_control_tolerance": -1.0})),
     Reading("identical controls refused", MappingProxyType({"equal_control_tolerance": 0.0})),
     Reading("goal bias 5 %", MappingProxyType({"goal_bias": 0.05})),
-    Reading("free part of a blocked extension kept", MappingProxyType({"cut_extension": "keep"})),
+    Reading("free part of a blocked extension kept", MappingProxyType({"cut_extension": "keep"}), ("s-rrt-compiled",)),
 )
 """Our reading is: law once an extension, reference at most 2 m away, horizon 2 s, controls within 0.1 refused."""
 

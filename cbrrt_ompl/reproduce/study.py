@@ -39,10 +39,10 @@ SEED = 1
 RUNS_PER_PART = 25
 SLOW_RUNS_PER_PART = 1
 
-NAIVE_SHARE = 4
-"""One run in so many is made with `NAIVE`, which takes seconds ..."""
+SLOW_SHARE = 4
+"""One run in so many is made where a run takes seconds ..."""
 
-NAIVE_RUNS = 6
+FEWEST_SLOW = 6
 """... but no less than these, if there are as many of the others."""
 
 
@@ -66,6 +66,8 @@ class Series:
     """The scene, with what the variant changes."""
     runs: int
     """How many."""
+    slow: bool = False
+    """Whether a run takes seconds."""
 
     @cached_property
     def data(self) -> dict[str, Any]:
@@ -129,17 +131,19 @@ def _full(scenes: dict[str, Scenario], runs: int) -> Iterator[Series]:
     """What the short report leaves out."""
     for scene in OTHERS:
         yield from (Series(Key(scene, "", planner), scenes[scene], runs) for planner in COMPILED)
-    few = min(runs, max(NAIVE_RUNS, runs // NAIVE_SHARE))
+    few = min(runs, max(FEWEST_SLOW, runs // SLOW_SHARE))
     for scene in (CASE_1, CASE_2):
         for kind in NEIGHBOURS:
             scenario = with_settings(scenes[scene], {"nearest_neighbour": kind})
             yield Series(Key(scene, kind, "cb-rrt-compiled"), scenario, runs)
         yield Series(Key(scene, "", "rrt"), scenes[scene], few)
-        yield Series(Key(scene, "", NAIVE), scenes[scene], few)
+        yield Series(Key(scene, "", NAIVE), scenes[scene], few, slow=True)
     for reading in READINGS:
         for scene in (CASE_1, CASE_2, ROOMS):
             scenario = with_settings(scenes[scene], reading.changes)
-            yield from (Series(Key(scene, reading.title, planner), scenario, runs) for planner in COMPILED)
+            for planner in COMPILED:
+                slow = planner in reading.slow_with and scene != CASE_1
+                yield Series(Key(scene, reading.title, planner), scenario, few if slow else runs, slow)
 
 
 def parts_of(series: Series, seeds: tuple[int, ...]) -> Iterator[Part]:
@@ -149,6 +153,6 @@ def parts_of(series: Series, seeds: tuple[int, ...]) -> Iterator[Part]:
         series: the series.
         seeds: those of its seeds that are to be run.
     """
-    size = SLOW_RUNS_PER_PART if series.key.planner == NAIVE else RUNS_PER_PART
+    size = SLOW_RUNS_PER_PART if series.slow else RUNS_PER_PART
     for first in range(0, len(seeds), size):
         yield Part(series.key, series.data, seeds[first : first + size])
