@@ -15,7 +15,6 @@ from matplotlib.legend_handler import HandlerPolyCollection
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from cbrrt_ompl.benchmark.charts import COLORS
-from cbrrt_ompl.benchmark.statistics import quartiles
 from cbrrt_ompl.figures import draw_scene, draw_trajectory, draw_tree, draw_velocities
 from cbrrt_ompl.planning import PlanResult, plan
 from cbrrt_ompl.reproduce.claims import QueryCosts
@@ -29,20 +28,23 @@ from cbrrt_ompl.scenario import Scenario
 
 NAMES = {"cb-rrt": "CB-RRT", "s-rrt": "S-RRT"}
 MARKERS = {"cb-rrt": "o", "s-rrt": "s", "grid": "o", "kd-tree": "^", "brute-force": "s"}
+LEGEND_COLUMN = 1.2
+"""Width of a column of a legend below a figure [in]."""
+
 KIND_COLORS = {"grid": "#0072B2", "kd-tree": "#009E73", "brute-force": "#CC3311"}
 
 
 def typical_plan(sample: Sample, scenario: Scenario) -> PlanResult:
-    """The run of a sample that is nearest to its median in nodes, made again from its seed.
+    """The run of a sample that is nearest to its medians in nodes and duration, made again from its seed.
 
     Args:
-        sample: runs of a planner of :func:`cbrrt_ompl.plan`.
+        sample: runs of a planner of :func:`cbrrt_ompl.plan`, of which one or more have succeeded.
         scenario: what they were run in.
     """
-    solved = [run for run in sample.runs if run.verified] or list(sample.runs)
-    median = quartiles(np.array([run.nodes for run in solved], dtype=float)).median
-    seed = min(solved, key=lambda run: abs(run.nodes - median)).seed
-    return plan(scenario, sample.key.planner, seed, TIME_LIMIT)
+    solved = [run for run in sample.runs if run.verified]
+    figures = np.log([[run.nodes, run.duration] for run in solved])  # (n, 2): distances as ratios
+    best = int(np.abs(figures - np.median(figures, axis=0)).sum(axis=1).argmin())
+    return plan(scenario, sample.key.planner, solved[best].seed, TIME_LIMIT)
 
 
 def scenes_figure(scenarios: Mapping[str, Scenario]) -> Figure:

@@ -14,6 +14,9 @@ from cbrrt_ompl.reproduce.verdicts import Answer, Claim, Verdict
 PIXEL_RATIO = 1.5
 """Pixels of a picture for one of the page."""
 
+NARROW = 650
+"""Width up to which a picture is shrunk to a narrow page; wider ones are scrolled [pixels of the page]."""
+
 
 @dataclass(frozen=True)
 class Heading:
@@ -163,7 +166,8 @@ def _html(block: Block) -> Iterator[str]:
             text = html.escape(caption)
             width = round(int.from_bytes(png[16:20], "big") / PIXEL_RATIO)
             image = f'<img alt="{text}" width="{width}" src="data:image/png;base64,{data}">'
-            yield f'<figure><div tabindex="0">{image}</div><figcaption>{text}</figcaption></figure>'
+            kind = ' class="wide"' if width > NARROW else ""
+            yield f'<figure{kind}><div tabindex="0">{image}</div><figcaption>{text}</figcaption></figure>'
         case Summary(claims):
             yield '<div class="claims">'
             for verdict in Verdict:
@@ -263,7 +267,7 @@ figure {
 }
 figure div { overflow-x: auto; }
 figure img { max-width: 100%; height: auto; }
-@media (max-width: 34rem) { figure img { max-width: none; width: 34rem; } }
+@media (max-width: 34rem) { .wide img { max-width: none; width: 34rem; } }
 figcaption { color: #4d565d; font-size: 0.88rem; padding: 0.35rem 0.3rem 0.1rem; }
 .claims { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 27rem), 1fr)); gap: 0.8rem; }
 .claim { background: var(--card); border: 1px solid var(--line); border-radius: 8px; padding: 0.8rem 1rem; }

@@ -166,7 +166,7 @@ def _typical_plans(material: Material) -> dict[tuple[str, str], PlanResult]:
     plans = {}
     for scene, planner in ((CASE_1, "cb-rrt"), (CASE_1, "s-rrt"), (CASE_2, "cb-rrt")):
         sample = material.sample(scene, planner)
-        if sample is not None:
+        if sample is not None and sample.succeeded.count:
             plans[scene, planner] = charts.typical_plan(sample, material.scenarios[scene])
     return plans
 
@@ -174,7 +174,7 @@ def _typical_plans(material: Material) -> dict[tuple[str, str], PlanResult]:
 def _paper_figures(material: Material, plans: Mapping[tuple[str, str], PlanResult]) -> Iterator[Block]:
     """Figures 3 to 6 of the paper."""
     yield Heading("Figures 3 to 6, made again")
-    yield Text("Each shows the run whose number of nodes is nearest to the median of all runs, in OMPL.")
+    yield Text("Each shows the run that is nearest to the medians of all runs in nodes and duration, in OMPL.")
     yield _picture("fig3.png", charts.scenes_figure(material.scenarios), "Fig. 3: the two scenes, as reconstructed.")
     first = [plans[CASE_1, planner] for planner in IN_OMPL if (CASE_1, planner) in plans]
     if first:
@@ -393,7 +393,7 @@ def _grids(material: Material, plans: Mapping[tuple[str, str], PlanResult]) -> I
                 [path.driving_time(scenario.start.theta, scenario.robot.limits) for path in grid.paths],
                 [1e3 * path.search_time for path in grid.paths],
             )
-            figures = tuple(number(float(np.median(values))) for values in measured)
+            figures = tuple(f"{np.median(values):.3g}" for values in measured)
         found = f"{len(grid.paths)} of {grid.places}"
         rows.append((title_of(grid.scene), f"{grid.cell:g} m", f"{grid.rule} free", found, *figures))
     header = (

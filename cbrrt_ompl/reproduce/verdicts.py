@@ -25,7 +25,7 @@ class Verdict(Enum):
 
     HOLDS = "holds"
     HOLDS_THERE = "holds in the paper's scenes, open elsewhere"
-    ONLY_THERE = "holds only in scenes like the paper's"
+    ONLY_THERE = "holds only in conditions like the paper's"
     FAILS = "does not hold"
     OPEN = "open"
 
