@@ -42,7 +42,7 @@ def typical_plan(sample: Sample, scenario: Scenario) -> PlanResult:
         scenario: what they were run in.
     """
     solved = [run for run in sample.runs if run.verified]
-    figures = np.log([[run.nodes, run.duration] for run in solved])  # (n, 2): distances as ratios
+    figures = np.log(np.array([[run.nodes, run.duration] for run in solved], dtype=float))  # (n, 2)
     best = int(np.abs(figures - np.median(figures, axis=0)).sum(axis=1).argmin())
     return plan(scenario, sample.key.planner, solved[best].seed, TIME_LIMIT)
 
@@ -263,7 +263,7 @@ def _legend_below(figure: Figure) -> None:
             shown.setdefault(label, handle)
     style: dict[str, Any] = {"fontsize": 8, "frameon": False, "columnspacing": 1.2, "handlelength": 1.6}
     figure.legend(
-        shown.values(), shown.keys(), loc="outside lower center", ncols=min(len(shown), 7),
+        shown.values(), shown.keys(), loc="outside lower center", ncols=min(len(shown), int(figure.get_figwidth() / LEGEND_COLUMN)),
         handler_map={PathCollection: HandlerPolyCollection()}, **style,
     )  # fmt: skip
 
