@@ -261,9 +261,10 @@ def _legend_below(figure: Figure) -> None:
     for ax in figure.axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             shown.setdefault(label, handle)
+    columns = min(len(shown), int(figure.get_figwidth() / LEGEND_COLUMN))
     style: dict[str, Any] = {"fontsize": 8, "frameon": False, "columnspacing": 1.2, "handlelength": 1.6}
     figure.legend(
-        shown.values(), shown.keys(), loc="outside lower center", ncols=min(len(shown), int(figure.get_figwidth() / LEGEND_COLUMN)),
+        shown.values(), shown.keys(), loc="outside lower center", ncols=columns,
         handler_map={PathCollection: HandlerPolyCollection()}, **style,
     )  # fmt: skip
 
