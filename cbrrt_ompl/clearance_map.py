@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cbrrt_ompl.disc_tree import COLUMNS, disc_tree
+from cbrrt_ompl.disc_tree import disc_tree
 from cbrrt_ompl.kinematics import sine_cosine
 from cbrrt_ompl.robot import Footprint
 from cbrrt_ompl.world import CONTACT_TOLERANCE, MITRE_LIMIT, World
@@ -54,7 +54,11 @@ class MapView(NamedTuple):
     children: NDArray[np.int32]
     """Index of the first of a cell's four children, 0 at a leaf; empty where there is no map, shape (n,)."""
     clearances: NDArray[np.float64]
-    """Where FCL was asked in each cell, and the signed clearance there: rows of (x, y, clearance), shape (n, 3) [m]."""
+    """Where FCL was asked in each cell, and the signed clearance there: rows of (x, y, clearance), shape (n, 3) [m].
+
+    The rows before the root are no cells but the parts of the footprint, two rows a disc: (x, y, outer), (inner, next,
+    0), see :func:`cbrrt_ompl.disc_tree.disc_tree`. An array of their own would cost a fifth of the kernels' speed.
+    """
     x_min: float
     """Bounds of the world [m]."""
     y_min: float
@@ -68,19 +72,18 @@ class MapView(NamedTuple):
     """Radius of a disc about the robot's origin that holds the grown footprint [m]."""
     is_round: bool
     """Whether the heading makes no difference."""
-    discs: NDArray[np.float64]
-    """Parts of the footprint, see :func:`cbrrt_ompl.disc_tree.disc_tree`, shape (m, COLUMNS)."""
+    root: int
+    """Row of the root cell."""
 
 
-FRAME_SIZE = len(MapView._fields) - 3
+FRAME_SIZE = len(MapView._fields) - 2
 """Numbers of a view besides its arrays."""
 
 
 @njit(cache=True)
 def unpack_view(children: NDArray[np.int32], clearances: NDArray[np.float64], f: NDArray[np.float64]) -> MapView:
-    """The view out of its arrays: f holds its numbers and the discs, shape (FRAME_SIZE + m * COLUMNS,)."""
-    discs = f[FRAME_SIZE:].reshape(((len(f) - FRAME_SIZE) // COLUMNS, COLUMNS))
-    return MapView(children, clearances, f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7] != 0.0, discs)
+    """The view out of its arrays, f of shape (FRAME_SIZE,)."""
+    return MapView(children, clearances, f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7] != 0.0, int(f[8]))
 
 
 @njit(cache=True)
@@ -92,7 +95,7 @@ def find_leaf(view: MapView, x: float, y: float) -> tuple[int, float, float, flo
     """
     size = view.size
     x_centre, y_centre = view.x_min + 0.5 * size, view.y_min + 0.5 * size
-    cell = 0
+    cell = view.root
     while view.children[cell] > 0:
         cell = view.children[cell]
         size *= 0.5
@@ -110,13 +113,14 @@ def find_leaf(view: MapView, x: float, y: float) -> tuple[int, float, float, flo
 
 
 @njit(cache=True)
-def certify(view: MapView, x: float, y: float) -> float:
+def certify(view: MapView, x: float, y: float, room: float) -> float:
     """What the map knows about a position.
 
     Args:
         view: the map.
         x: position of the robot's origin [m].
         y: position of the robot's origin [m].
+        room: how much farther than to touch nothing the footprint has to be from everything [m]; 0 or `ROOM`.
 
     Returns:
         `COLLISION`; or `UNDECIDED`; or a distance [m] within which every position is free, whatever the heading.
@@ -125,7 +129,7 @@ def certify(view: MapView, x: float, y: float) -> float:
         return COLLISION
     if len(view.children) == 0:
         return UNDECIDED
-    return certify_disc(view, x, y, view.outer, view.inner)
+    return certify_disc(view, x, y, view.outer + room, view.inner + room)
 
 
 @njit(cache=True)
@@ -153,7 +157,7 @@ def certify_disc(view: MapView, x: float, y: float, outer: float, inner: float) 
 
 
 @njit(cache=True)
-def certify_pose(view: MapView, x: float, y: float, theta: float) -> tuple[float, bool]:
+def certify_pose(view: MapView, x: float, y: float, theta: float, room: float) -> tuple[float, bool]:
     """What the map knows about a pose.
 
     Args:
@@ -161,20 +165,21 @@ def certify_pose(view: MapView, x: float, y: float, theta: float) -> tuple[float
         x: position [m].
         y: position [m].
         theta: heading [rad].
+        room: see :func:`certify`.
 
     Returns:
         `COLLISION`, `UNDECIDED` or a distance [m] that no point of the footprint may move further than, to be free;
         and whether it is one for the origin alone, whatever the heading.
     """
-    margin = certify(view, x, y)
+    margin = certify(view, x, y, room)
     if margin != UNDECIDED or view.is_round or len(view.children) == 0:
         return margin, True
-    margin, _, _, _ = certify_parts(view, x, y, theta)
+    margin, _, _, _ = certify_parts(view, x, y, theta, room)
     return margin, False
 
 
 @njit(cache=True)
-def certify_parts(view: MapView, x: float, y: float, theta: float) -> tuple[float, int, float, float]:
+def certify_parts(view: MapView, x: float, y: float, theta: float, room: float) -> tuple[float, int, float, float]:
     """What the map knows about the parts of a footprint, coarse ones first.
 
     Args:
@@ -182,28 +187,30 @@ def certify_parts(view: MapView, x: float, y: float, theta: float) -> tuple[floa
         x: position [m].
         y: position [m].
         theta: heading [rad].
+        room: see :func:`certify`.
 
     Returns:
-        See :func:`certify_pose`; and where it is `UNDECIDED` the smallest part that could not be decided, the row of
-        its disc and its centre [m].
+        See :func:`certify_pose`; and where it is `UNDECIDED` the smallest part that could not be decided, the first row
+        of its disc and its centre [m].
     """
     s, c = sine_cosine(theta)
     margin, row = min(x - view.x_min, view.x_max - x, y - view.y_min, view.y_max - y), 0  # the origin stays inside
-    while row < len(view.discs):
-        dx, dy, outer, inner = view.discs[row, 0], view.discs[row, 1], view.discs[row, 2], view.discs[row, 3]
+    discs = view.clearances
+    while row < view.root:
+        dx, dy, outer, inner = discs[row, 0], discs[row, 1], discs[row, 2], discs[row + 1, 0]
         x_disc, y_disc = x + c * dx - s * dy, y + s * dx + c * dy
         found = UNDECIDED
         if view.x_min < x_disc < view.x_max and view.y_min < y_disc < view.y_max:
-            found = certify_disc(view, x_disc, y_disc, outer, inner)
-        after = int(view.discs[row, 4])
+            found = certify_disc(view, x_disc, y_disc, outer + room, inner + room)
+        after = int(discs[row + 1, 1])
         if found == COLLISION:
             return COLLISION, row, x_disc, y_disc
-        has_parts = after > row + 1
+        has_parts = after > row + 2
         if found >= GOOD_MARGIN or (found != UNDECIDED and not has_parts):
             margin = min(margin, found)
             row = after
         elif has_parts:
-            row += 1
+            row += 2
         else:
             return UNDECIDED, row, x_disc, y_disc
     return margin, row, x, y
@@ -218,7 +225,7 @@ class ClearanceMap:
         checker: the FCL queries behind the map.
         children: see :class:`MapView`; replaced when the map grows.
         clearances: see :class:`MapView`; replaced when the map grows.
-        frame: the other numbers of the view and the footprint's discs, see :func:`unpack_view`.
+        frame: the other numbers of the view, shape (FRAME_SIZE,).
         answers: FCL's answers of the present extension, rows of (x, y, theta, margin), shape (n, 4).
         exact_queries: states that FCL had to decide with the real footprint.
     """
@@ -234,7 +241,6 @@ class ClearanceMap:
         self.checker = world.checker(footprint)
         self.enabled = enabled
         self._is_round = footprint.is_round
-        self._discs = disc_tree(footprint, MITRE_LIMIT * CONTACT_TOLERANCE)
         self.exact_queries = 0
         self._signed_clearance = world.checker(Footprint.point()).signed_clearance
         bounds = world.bounds
@@ -244,15 +250,18 @@ class ClearanceMap:
         if footprint.inscribed_radius == 0.0 and not footprint.is_round:
             inner = -math.inf  # the origin is beside the footprint, and may well be inside an obstacle
         outer = footprint.circumscribed_radius + MITRE_LIMIT * CONTACT_TOLERANCE
-        frame = [*bounds.min, *bounds.max, size, inner, outer, footprint.is_round, *self._discs.ravel()]
-        self.frame = np.array(frame, dtype=float)
+        discs = disc_tree(footprint, MITRE_LIMIT * CONTACT_TOLERANCE)
+        root = 2 * len(discs) if enabled else 0
+        self.frame = np.array([*bounds.min, *bounds.max, size, inner, outer, footprint.is_round, root], dtype=float)
         self.answers: NDArray[np.float64] = np.empty((64, 4))
         self._margins: dict[tuple[float, float, float], float] = {}
-        self._cells = 1 if enabled else 0
-        self.children: NDArray[np.int32] = np.zeros(self._cells, dtype=np.int32)
-        self.clearances: NDArray[np.float64] = np.zeros((self._cells, 3))
+        self._root, self._rows = root, root + 1 if enabled else 0
+        self.children: NDArray[np.int32] = np.zeros(self._rows, dtype=np.int32)
+        self.clearances: NDArray[np.float64] = np.zeros((self._rows, 3))
         if enabled:
-            self._ask_clearance(0, bounds.min[0] + 0.5 * size, bounds.min[1] + 0.5 * size)
+            self.clearances[0:root:2], self.clearances[1:root:2, 0] = discs[:, :3], discs[:, 3]
+            self.clearances[1:root:2, 1] = 2.0 * discs[:, 4]
+            self._ask_clearance(root, bounds.min[0] + 0.5 * size, bounds.min[1] + 0.5 * size)
 
     @property
     def view(self) -> MapView:
@@ -262,23 +271,23 @@ class ClearanceMap:
     @property
     def cells(self) -> int:
         """Cells in the map."""
-        return self._cells
+        return self._rows - self._root
 
     def collides(self, x: float, y: float, theta: float) -> bool:
         """Whether the footprint touches an obstacle or a wall at a pose [m, m, rad]: always FCL's answer.
 
-        Where the map does not know yet, it is refined on the way.
+        Where the map does not know about the position yet, it is refined on the way.
         """
-        certificate = certify_packed(self.children, self.clearances, self.frame, x, y, theta)
-        if certificate == UNDECIDED:
-            certificate = self._refine(x, y, theta)
+        certificate = certify_packed(self.children, self.clearances, self.frame, x, y, theta, 0.0)
+        if certificate == UNDECIDED and self.enabled:  # to ask FCL costs less than to refine the map for the parts
+            certificate = self._refine_disc(x, y, *self.frame[6:4:-1].tolist())
         if certificate == UNDECIDED:
             self.exact_queries += 1
             return self.checker.collides(x, y, theta)
         return bool(certificate == COLLISION)
 
     def answer(self, answered: int, x: float, y: float, theta: float) -> int:
-        """Settle a pose that a kernel asked about: by refining the map, else by a row of ``answers`` from FCL.
+        """Settle whether a pose has `ROOM`: by refining the map, else by a row of ``answers`` from FCL.
 
         Args:
             answered: rows of ``answers`` in use.
@@ -289,8 +298,7 @@ class ClearanceMap:
         Returns:
             Rows of ``answers`` in use afterwards.
         """
-        certificate = self._refine(x, y, theta)
-        if certificate == COLLISION or certificate > ROOM:
+        if self._refine(x, y, theta, ROOM) != UNDECIDED:
             return answered
         if answered == len(self.answers):
             self.answers = np.concatenate([self.answers, np.empty_like(self.answers)])
@@ -303,7 +311,7 @@ class ClearanceMap:
         if self._is_round and self.enabled:
             cell, _, _, _ = find_leaf_packed(self.children, self.clearances, self.frame, x, y)
             self._ask_clearance(cell, x, y)
-            certificate = certify_packed(self.children, self.clearances, self.frame, x, y, theta)
+            certificate = certify_packed(self.children, self.clearances, self.frame, x, y, theta, 0.0)
             if certificate != UNDECIDED:
                 return max(certificate, 0.0)
             return self.checker.margin(x, y, theta)
@@ -318,30 +326,32 @@ class ClearanceMap:
         """Let FCL measure the clearance of a point in a cell, and keep it."""
         self.clearances[cell] = x, y, self._signed_clearance(x, y)
 
-    def _refine(self, x: float, y: float, theta: float) -> float:
+    def _refine(self, x: float, y: float, theta: float, room: float) -> float:
         """Split the cells at an undecided pose until it is decided, or nothing could be; the certificate then."""
-        cells = -1
-        while self.enabled and cells != self._cells:  # what is learnt about one disc may decide another
-            cells = self._cells
+        rows = -1
+        while self.enabled and rows != self._rows:  # what is learnt about one disc may decide another
+            rows = self._rows
             inner, outer = self.frame[5:7].tolist()
-            if self._refine_disc(x, y, outer, inner) != UNDECIDED or self._is_round:
+            if self._refine_disc(x, y, outer + room, inner + room) != UNDECIDED or self._is_round:
                 break
-            found, row, x_disc, y_disc = certify_parts_packed(self.children, self.clearances, self.frame, x, y, theta)
+            found, row, x_disc, y_disc = certify_parts_packed(
+                self.children, self.clearances, self.frame, x, y, theta, room
+            )
             while found == UNDECIDED:
-                outer, inner = self._discs[row, 2:4].tolist()
-                if self._refine_disc(x_disc, y_disc, outer, inner) == UNDECIDED:
+                outer, inner = self.clearances[row, 2].item(), self.clearances[row + 1, 0].item()
+                if self._refine_disc(x_disc, y_disc, outer + room, inner + room) == UNDECIDED:
                     break
                 found, row, x_disc, y_disc = certify_parts_packed(
-                    self.children, self.clearances, self.frame, x, y, theta
+                    self.children, self.clearances, self.frame, x, y, theta, room
                 )
-        return certify_packed(self.children, self.clearances, self.frame, x, y, theta)
+        return certify_packed(self.children, self.clearances, self.frame, x, y, theta, room)
 
     def _refine_disc(self, x: float, y: float, outer: float, inner: float) -> float:
         """Split the cells at a disc until it is decided, or cannot be; the certificate then."""
         if not self._has_inside(x, y):
             return UNDECIDED
         view = self.children, self.clearances, self.frame
-        while self._cells + 4 <= MAX_CELLS:
+        while self.cells + 4 <= MAX_CELLS:
             cell, x_centre, y_centre, size = find_leaf_packed(*view, x, y)
             if size < self._smallest or self._is_hopeless(cell, x, y, outer, inner):
                 break
@@ -365,14 +375,14 @@ class ClearanceMap:
 
     def _split(self, cell: int, x: float, y: float, offset: float) -> None:
         """Give a leaf its four children, whose centres FCL measures."""
-        first = self._cells
+        first = self._rows
         if first + 4 > len(self.children):
-            capacity = min(2 * len(self.children) + 64, MAX_CELLS + 4)
+            capacity = min(2 * len(self.children) + 64, self._root + MAX_CELLS + 4)
             self.children = np.concatenate([self.children, np.zeros(capacity - first, dtype=np.int32)])
             self.clearances = np.concatenate([self.clearances, np.zeros((capacity - first, 3))])
         for i, (dx, dy) in enumerate(((-1, -1), (1, -1), (-1, 1), (1, 1))):
             self._ask_clearance(first + i, x + dx * offset, y + dy * offset)
-        self._cells += 4
+        self._rows += 4
         self.children[cell] = first  # last, so that no reader ever meets a child without its clearance
 
 
@@ -395,9 +405,10 @@ def certify_packed(
     x: float,
     y: float,
     theta: float,
+    room: float,
 ) -> float:
     """:func:`certify_pose` for a caller in Python, to whom arrays cost less than a named tuple."""
-    return certify_pose(unpack_view(children, clearances, frame), x, y, theta)[0]
+    return certify_pose(unpack_view(children, clearances, frame), x, y, theta, room)[0]
 
 
 @njit(cache=True)
@@ -408,9 +419,10 @@ def certify_parts_packed(
     x: float,
     y: float,
     theta: float,
+    room: float,
 ) -> tuple[float, int, float, float]:
     """:func:`certify_parts` for a caller in Python."""
-    return certify_parts(unpack_view(children, clearances, frame), x, y, theta)
+    return certify_parts(unpack_view(children, clearances, frame), x, y, theta, room)
 
 
 @njit(cache=True)

@@ -45,11 +45,11 @@ def disc_tree(footprint: Footprint, growth: float) -> NDArray[np.float64]:
 
 def _add(rows: list[list[float]], part: shapely.Geometry, polygon: shapely.Polygon, growth: float, depth: int) -> None:
     """Append the row of a part and those of its own parts."""
+    x0, y0, x1, y1 = part.bounds
+    centre = shapely.Point(0.5 * (x0 + x1), 0.5 * (y0 + y1))
     corners = shapely.get_coordinates(part)
-    centre = shapely.minimum_bounding_circle(part).centroid
     outer = float(np.hypot(*(corners - (centre.x, centre.y)).T).max()) * (1.0 + 1e-12) + growth
-    depth_inside = shapely.distance(polygon.exterior, centre)
-    inner = depth_inside if polygon.contains(centre) else -math.inf
+    inner = shapely.distance(polygon.exterior, centre) if polygon.contains(centre) else -math.inf
     row = [centre.x, centre.y, outer, inner, 0.0]
     rows.append(row)
     if depth > 0:

@@ -274,7 +274,7 @@ def is_doomed(
     """Whether the map alone shows that the next steps meet an obstacle: then FCL need not be asked."""
     for _ in range(steps):
         x, y, theta, v, omega, _, _ = advance(x, y, theta, v, omega, control, model, model.dt)
-        if certify_pose(view, x, y, theta)[0] == COLLISION:
+        if certify_pose(view, x, y, theta, ROOM)[0] == COLLISION:
             return True
         if has_come_to_end((x, y, theta, v, omega), control, model):
             return False
@@ -355,12 +355,12 @@ def check_step_motion(
             v = step.v + share * (step.v_end - step.v)
             omega = step.omega + share * (step.omega_end - step.omega)
             pose = unicycle_step(step.x, step.y, step.theta, step.v, step.omega, v, omega, share * dt)
-        margin, is_certified = certify_pose(view, pose[0], pose[1], pose[2])
-        if UNDECIDED <= margin <= ROOM:
+        margin, is_certified = certify_pose(view, pose[0], pose[1], pose[2], ROOM)
+        if margin == UNDECIDED:
             margin, is_certified = find_answer(answers, answered, pose[0], pose[1], pose[2]), False
             if margin < 0.0:
                 return ASK, margin, is_certified, pose
-        margin -= ROOM
+            margin -= ROOM
         if margin <= 0.0:
             return BLOCKED, margin, is_certified, pose
     return EXTENDED, margin, is_certified, pose
@@ -455,8 +455,8 @@ def roll_out(
         steps = most_steps(control[2], math.hypot(goal.x - x, goal.y - y), model.limits, dt)
     near_goal = goal.tolerance * goal.tolerance * (1.0 + 1e-9)
     reach = 0.0 if view.is_round else view.outer
-    margin, is_certified = certify_pose(view, x, y, theta)
-    margin = max(margin - ROOM, 0.0)
+    margin, is_certified = certify_pose(view, x, y, theta, ROOM)
+    margin = max(margin, 0.0)
     k = 0
     while k < steps:
         if manoeuvres or model.law == CLOSED_LOOP:
@@ -562,7 +562,7 @@ def brake(
 ) -> tuple[int, tuple[float, float, float]]:
     """Brake to rest from a valid state: `EXTENDED` (free), `BLOCKED` or `ASK`, and the pose that FCL must decide."""
     stopping_distance = abs(state[3]) * (0.5 * stopping_time(state[3], state[4], model.limits) + model.dt)
-    if certify(view, state[0], state[1]) > stopping_distance:
+    if certify(view, state[0], state[1], ROOM) > stopping_distance:
         return EXTENDED, (0.0, 0.0, 0.0)
     _, outcome, _, pose = roll_out(state, (0.0, 0.0, BRAKE), model, view, answers, answered, scratch)
     return outcome, pose

@@ -186,7 +186,7 @@ def compare(
         exact = collides(*pose)
         before = clearance_map.exact_queries
         found.wrong_answers += clearance_map.collides(*pose) != exact
-        certificate, _ = certify_pose(clearance_map.view, *pose)
+        certificate, _ = certify_pose(clearance_map.view, *pose, 0.0)
         found.wrong_certificates += certificate != UNDECIDED and (certificate == COLLISION) != exact
         found.certified += clearance_map.exact_queries == before
         found.in_collision += exact
@@ -237,7 +237,7 @@ def test_every_pose_within_a_certified_margin_is_free(
     margins = 0
     for pose in (next(poses) for poses in (uniform_poses(world, rng), border_poses(world, footprint, rng)) * 300):
         clearance_map.collides(*pose)
-        margin, for_every_heading = certify_pose(clearance_map.view, *pose)
+        margin, for_every_heading = certify_pose(clearance_map.view, *pose, 0.0)
         if margin in (COLLISION, UNDECIDED):
             continue
         margins += 1
@@ -342,7 +342,7 @@ def test_positions_out_of_bounds_or_not_numbers_collide_without_a_query(footprin
     nan, inf = math.nan, math.inf
     for x, y in [(nan, 0.0), (0.0, nan), (inf, 0.0), (0.0, -inf), (2.0, 0.0), (-2.0, 0.0), (0.0, 2.0), (0.0, -2.5)]:
         assert clearance_map.collides(x, y, 0.0)
-        assert certify(clearance_map.view, x, y) == COLLISION
+        assert certify(clearance_map.view, x, y, 0.0) == COLLISION
     assert (clearance_map.cells, clearance_map.exact_queries) == (cells, 0)
     assert clearance_map.checker.queries == queries
 
@@ -373,7 +373,7 @@ def test_states_that_fcl_decided_are_counted(rng: np.random.Generator) -> None:
 def test_a_decided_question_takes_no_row_of_answers() -> None:
     clearance_map = ClearanceMap(small_world(), FOOTPRINTS["rectangle"])
     assert clearance_map.answer(0, -0.5, -1.0, 0.0) == 0
-    assert certify(clearance_map.view, -0.5, -1.0) > 0.0
+    assert certify(clearance_map.view, -0.5, -1.0, 0.0) > 0.0
     assert clearance_map.exact_queries == 0
 
 
