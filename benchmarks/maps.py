@@ -5,6 +5,7 @@ from the start to the goal that all BARN worlds share. Nothing is downloaded; na
 
     python benchmarks/maps.py --maps depot.yaml tb3_sandbox.yaml --pairs 100
     python benchmarks/maps.py --barn world_0.csv --seeds 100
+    python benchmarks/maps.py --dynobench bugtrap_0.yaml kink_0.yaml --model unicycle2_v0.yaml --seeds 20
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +33,7 @@ from cbrrt_ompl import (
     verify,
 )
 from cbrrt_ompl.maps.discs import load_discs
+from cbrrt_ompl.maps.dynobench import load_dynobench
 from cbrrt_ompl.maps.loading import load_map
 from cbrrt_ompl.maps.occupancy_map import OccupancyMap
 
@@ -106,6 +109,14 @@ def barn_scenarios(path: Path, seeds: int) -> Iterator[Scenario]:
         yield scenario
 
 
+def dynobench_scenarios(path: Path, model: Path, seeds: int) -> Iterator[tuple[str, list[Scenario]]]:
+    """A problem of dynobench's, forward only and not, with the tolerance for samplers and for optimizers."""
+    for forward_only, ways in ((True, "ahead"), (False, "both")):
+        for tolerance in (0.2, 0.03):
+            scenario = load_dynobench(path, model, forward_only=forward_only, tolerance=tolerance)
+            yield f"{path.stem} {ways} {tolerance}", [scenario] * seeds
+
+
 def measure(scenarios: list[Scenario], planner: str, time_limit: float, verified: bool) -> str:
     """Plan them all, the number of a scenario being its seed, and say what came of it."""
     results = [plan(s, planner, seed=seed, time_limit=time_limit) for seed, s in enumerate(scenarios)]
@@ -126,29 +137,41 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--maps", type=Path, nargs="*", default=[], help="maps in which the TurtleBot3 plans")
     parser.add_argument("--barn", type=Path, nargs="*", default=[], help="CSV files of discs in which the Jackal plans")
+    parser.add_argument("--dynobench", type=Path, nargs="*", default=[], help="problems of dynobench's")
+    parser.add_argument("--model", type=Path, help="the model of dynobench's robot")
     parser.add_argument("--pairs", type=int, default=100, help="random pairs of poses in a map")
-    parser.add_argument("--seeds", type=int, default=100, help="plans in a BARN world")
+    parser.add_argument("--seeds", type=int, default=100, help="plans in a world of BARN's or dynobench's")
     parser.add_argument("--planners", nargs="+", default=["cb-rrt-compiled", "cb-rrt-robust"])
     parser.add_argument("--time-limit", type=float, default=1.0, help="[s]")
     parser.add_argument("--cold", action="store_true", help="do not make the clearance maps beforehand")
+    parser.add_argument("--closed-loop", action="store_true", help="evaluate the law at every step")
     parser.add_argument("--verify", action="store_true", help="verify every trajectory (slow)")
     arguments = parser.parse_args()
-    print("world            planner            solved   median ms  95 % ms  duration s  nodes")
-    for path in [*arguments.maps, *arguments.barn]:
-        began = time.perf_counter()
-        is_map = path in arguments.maps
-        scenarios = list(map_scenarios(path, arguments.pairs) if is_map else barn_scenarios(path, arguments.seeds))
-        print(
-            f"{path.stem}: {len(scenarios[0].world.obstacles)} obstacles, {time.perf_counter() - began:.2f} s to load"
-        )
+    print(f"{'world':<26}{'planner':<16} solved   median ms  95 % ms  duration s  nodes")
+    for name, scenarios in groups(arguments):
+        if arguments.closed_loop:
+            scenarios = [replace(s, planning=replace(s.planning, closed_loop=True)) for s in scenarios]
         if not arguments.cold:
             for seed, scenario in enumerate(scenarios):
                 plan(scenario, "cb-rrt-robust", seed=1000 + seed, time_limit=arguments.time_limit)
         for planner in arguments.planners:
-            print(
-                f"{path.stem:<16} {planner:<16} {measure(scenarios, planner, arguments.time_limit, arguments.verify)}",
-                flush=True,
-            )
+            found = measure(scenarios, planner, arguments.time_limit, arguments.verify)
+            print(f"{name:<26}{planner:<16}{found}", flush=True)
+
+
+def groups(arguments: argparse.Namespace) -> Iterator[tuple[str, list[Scenario]]]:
+    """Scenarios that make one line of the table, with its name."""
+    for path in arguments.maps:
+        began = time.perf_counter()
+        scenarios = list(map_scenarios(path, arguments.pairs))
+        print(
+            f"{path.stem}: {len(scenarios[0].world.obstacles)} obstacles, {time.perf_counter() - began:.2f} s to load"
+        )
+        yield path.stem, scenarios
+    for path in arguments.barn:
+        yield path.stem, list(barn_scenarios(path, arguments.seeds))
+    for path in arguments.dynobench:
+        yield from dynobench_scenarios(path, arguments.model, arguments.seeds)
 
 
 if __name__ == "__main__":
