@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from cbrrt_ompl.kernel_cache import drop_stale_kernels
 from cbrrt_ompl.robot import Limits
@@ -305,3 +306,34 @@ def kinematic_step(
     v, omega = command
     x, y, theta = unicycle_step(x, y, theta, v, omega, v, omega, dt)
     return x, y, theta, v, omega
+
+
+@njit(cache=True)
+def brake(
+    x: float, y: float, theta: float, v: float, omega: float, limits: Limits, dt: float, most_steps: int
+) -> NDArray[np.float64]:
+    """States from a given one to rest, both velocities braked as hard as the limits allow.
+
+    Args:
+        x: position [m].
+        y: position [m].
+        theta: heading [rad].
+        v: forward velocity [m/s].
+        omega: turning rate [rad/s].
+        limits: limits of the robot.
+        dt: duration of a step [s].
+        most_steps: steps after which to give up.
+
+    Returns:
+        The given state and one a step, shape (n, 5); the last one at rest, unless n is ``most_steps + 1``.
+    """
+    states = np.empty((64, 5))
+    n = 0
+    while True:
+        states[n, 0], states[n, 1], states[n, 2], states[n, 3], states[n, 4] = x, y, theta, v, omega
+        if n == most_steps or (v == 0.0 and omega == 0.0):
+            return states[: n + 1].copy()
+        n += 1
+        if n == len(states):
+            states = np.concatenate((states, np.empty_like(states)))
+        x, y, theta, v, omega = dynamic_step(x, y, theta, v, omega, (0.0, 0.0), limits, dt)

@@ -25,11 +25,12 @@ def trajectory_from_controls(
         model: packed model that the controls were made for.
 
     Returns:
-        The trajectory on the integration grid, from time 0.
+        The trajectory on the integration grid, from time 0, with the limits of the model.
     """
     states, commands = replay_path(start, controls, steps, model)
     t = model[1] * np.arange(len(states))
-    return Trajectory(t, *states.T, *commands.T, kinematic=int(model[0]) == STEERING)
+    is_kinematic, limits = int(model[0]) == STEERING, unpack_model(model).limits
+    return Trajectory(t, *states.T, *commands.T, kinematic=is_kinematic, limits=limits)
 
 
 def tree_from_controls(

@@ -10,12 +10,16 @@ import uuid
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cbrrt_ompl.errors import MISSING, Problem, TrajectoryError
+from cbrrt_ompl.settings import MAX_STEPS
+
+if TYPE_CHECKING:
+    from cbrrt_ompl.robot import Limits
 
 COLUMNS = ("t", "x", "y", "theta", "v", "omega", "v_command", "omega_command")
 """The arrays of a trajectory, in the order of the CSV header."""
@@ -78,6 +82,8 @@ class Trajectory:
     """Commanded turning rates [rad/s]."""
     kinematic: bool = field(default=False, kw_only=True)
     """Whether the velocities jump to their commands."""
+    limits: Limits | None = field(default=None, kw_only=True)
+    """Limits of the robot that it was planned for, if they are known; no part of its equality or of its files."""
 
     def __post_init__(self) -> None:
         """Check, copy and freeze the arrays."""
@@ -174,6 +180,65 @@ class Trajectory:
         poses = self.poses[row] + displacement(self.theta[row], v0, v, w0, omega, elapsed)
         states[between] = np.column_stack([poses[:, :2], wrapped(poses[:, 2]), v, omega])
         return states
+
+    def stopping_at(self, t: float, limits: Limits | None = None, step: float | None = None) -> Trajectory:
+        """Drive on until a time and then brake to rest: v and omega at once, each under its full deceleration.
+
+        Braking begins at the first row at or after the time. A kinematic trajectory stands after one more step.
+
+        Args:
+            t: time from ``t[0]`` to ``t[-1]`` [s].
+            limits: limits of the robot; those of the trajectory if not given.
+            step: integration step while braking [s]; that of the trajectory at this row if not given.
+
+        Returns:
+            The rows up to there and those of the braking, which ends with v = omega = 0; nothing is added to a row
+            that is at rest already.
+
+        Raises:
+            TrajectoryError: if the time is outside the trajectory, the limits or the step are neither given nor known,
+                or no robot has such limits or comes to rest in `MAX_STEPS` steps.
+        """
+        if not self.t[0] <= t <= self.t[-1]:
+            raise TrajectoryError(Problem("t", t, f"a time from {self.t[0]:g} to {self.t[-1]:g} s"))
+        row = int(np.searchsorted(self.t, t))
+        at_rest = self.v[row] == 0.0 and self.omega[row] == 0.0
+        limits = self.limits if limits is None else limits
+        step = self._step_at(row) if step is None else step
+        problems = [] if limits is None else limits.problems()
+        if limits is None and not (self.kinematic or at_rest):
+            problems.append(Problem("limits", MISSING, "the limits of the robot: the trajectory has none of its own"))
+        if not at_rest and not (math.isfinite(step) and step > 0.0):
+            problems.append(Problem("step", MISSING if math.isnan(step) else step, "an integration step above 0 [s]"))
+        if problems:
+            raise TrajectoryError(problems)
+        states = self.states[row : row + 1] if at_rest else self._braking(row, limits, step)  # (m + 1, 5)
+        commands = np.column_stack([self.v_command, self.omega_command])[: row + 1]
+        commands[row] = commands[row - 1] if at_rest and row > 0 else 0.0
+        times = self.t[row] + step * np.arange(1, len(states))
+        return Trajectory(
+            np.concatenate([self.t[: row + 1], times]),
+            *np.concatenate([self.states[:row], states]).T,
+            *np.concatenate([commands, np.zeros((len(times), 2))]).T,
+            kinematic=self.kinematic,
+            limits=limits,
+        )
+
+    def _step_at(self, row: int) -> float:
+        """Duration of the step after a row, or before the last one [s]; NaN where there is only one row."""
+        return float(np.diff(self.t)[min(row, len(self) - 2)]) if len(self) > 1 else math.nan
+
+    def _braking(self, row: int, limits: Limits | None, step: float) -> NDArray[np.float64]:
+        """States of the braking from a row on, shape (m + 1, 5)."""
+        from cbrrt_ompl.kinematics import brake  # here, since files are read and verified without any kernel
+
+        if self.kinematic:
+            return np.array([self.states[row], [*self.poses[row], 0.0, 0.0]])
+        states = brake(*self.states[row].tolist(), limits, step, MAX_STEPS)
+        if len(states) > MAX_STEPS:
+            expected = f"a step in which {MAX_STEPS} of them bring the robot to rest"
+            raise TrajectoryError(Problem("step", step, expected))
+        return np.asarray(states)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a CSV, NPZ or JSON file, by the suffix; an existing file stays whole until the new one is.
