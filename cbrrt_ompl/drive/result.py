@@ -1,0 +1,118 @@
+"""What came of a drive."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cbrrt_ompl.drive.settings import DriveSettings
+from cbrrt_ompl.obstacles import Obstacle
+from cbrrt_ompl.scenario import Scenario
+from cbrrt_ompl.settings import State
+from cbrrt_ompl.trajectory import Trajectory
+from cbrrt_ompl.verification import Verification, verify
+
+REACHED, STOPPED = "reached", "stopped"
+"""How a drive ends."""
+
+LATE, UNSAFE, NO_ROOM = "late", "unsafe", "no room"
+"""Why a plan was not taken, besides the reasons of a planner."""
+
+
+@dataclass(frozen=True, eq=False)
+class Replan:
+    """One plan made on the way."""
+
+    time: float
+    """When it was begun [s]."""
+    start: State
+    """The state that it starts from: where the robot is to be when the plan is ready."""
+    start_time: float
+    """When the robot is there [s]."""
+    status: str
+    """``solved``, ``time limit``, ``sample limit``, ``late`` (solved when its time was over), ``unsafe`` (its first
+    cycle cannot be braked from) or ``no room`` (what is known covers the goal)."""
+    samples: int
+    """Samples drawn."""
+    planning_time: float
+    """Time of the search alone [s]."""
+    trajectory: Trajectory | None
+    """The plan in the drive's time, if it was taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cycle:
+    """One look around and what followed from it."""
+
+    time: float
+    """When the robot looked [s]."""
+    seen: tuple[Obstacle, ...]
+    """Obstacles seen for the first time."""
+    replan: Replan | None
+    """The plan made, if one was needed."""
+    computing_time: float
+    """Time of all its computing: knowledge, checks and planning [s]."""
+    is_braking: bool
+    """Whether the robot brakes or stands when the cycle is over."""
+
+
+@dataclass(frozen=True, eq=False)
+class DriveResult:
+    """What came of a drive."""
+
+    status: str
+    """``reached`` or ``stopped``."""
+    trajectory: Trajectory
+    """The way driven, on the planning steps."""
+    braking: Trajectory
+    """The way driven and the braking that was ready at its end."""
+    cycles: tuple[Cycle, ...]
+    """Everything that was seen and decided, in order."""
+    scenario: Scenario
+    """The true world, with the hidden obstacles behind those known at the start."""
+    known: int
+    """How many obstacles of the scenario were known at the start: the first ones."""
+    settings: DriveSettings
+    """How it was driven."""
+
+    @property
+    def reached(self) -> bool:
+        """Whether the robot is in the goal region."""
+        return self.status == REACHED
+
+    @property
+    def replans(self) -> list[Replan]:
+        """The plans made, the first one among them."""
+        return [cycle.replan for cycle in self.cycles if cycle.replan is not None]
+
+    @property
+    def hidden(self) -> Sequence[Obstacle]:
+        """The obstacles that were not known at the start."""
+        return self.scenario.world.obstacles[self.known :]
+
+    @property
+    def planning_times(self) -> NDArray[np.float64]:
+        """Times of the searches, shape (n,) [s]."""
+        return np.array([replan.planning_time for replan in self.replans])
+
+    @property
+    def computing_times(self) -> NDArray[np.float64]:
+        """Times of all computing in the cycles, shape (m,) [s]."""
+        return np.array([cycle.computing_time for cycle in self.cycles])
+
+    @cached_property
+    def verification(self) -> Verification:
+        """The way driven, verified in the true world; that a stopped robot is not at the goal is no violation."""
+        found = verify(self.trajectory, self.scenario)
+        if self.reached:
+            return found
+        return replace(found, violations=tuple(v for v in found.violations if v.kind != "goal"))
+
+    @property
+    def smallest_clearance(self) -> float:
+        """Smallest distance of the footprint from obstacles and walls of the true world [m]."""
+        return self.verification.smallest_clearance

@@ -1,0 +1,133 @@
+"""How a drive senses and plans again, and how far the sensor must see for it to be safe."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+import shapely
+
+from cbrrt_ompl.errors import Problem, SettingsError
+from cbrrt_ompl.extension import STEERING, law_of
+from cbrrt_ompl.kinematics import brake
+from cbrrt_ompl.planning import PLANNERS
+from cbrrt_ompl.robot import Footprint, Robot
+from cbrrt_ompl.settings import MAX_STEPS, PlanningSettings
+
+STEP_TOLERANCE = 1e-6
+"""Share of a planning step by which the cycle may differ from whole steps."""
+
+
+BRAKE_SAFE: dict[str, Any] = {"brake_safe": True} if "brake_safe" in {f.name for f in fields(PlanningSettings)} else {}
+"""Where planners know it, they keep only what can be braked from."""
+
+
+@dataclass(frozen=True)
+class DriveSettings:
+    """Settings of a drive.
+
+    Raises:
+        SettingsError: with every value that makes no sense.
+    """
+
+    sensor_range: float = 3.0
+    """Obstacles no farther than this from the robot's origin are seen [m]."""
+    cycle: float = 0.1
+    """Time between two looks, and what a plan may take [s]; whole planning steps."""
+    planner: str = "cb-rrt-robust"
+    """Name of a planner that keeps the acceleration limits."""
+    goal_bias: float = 0.05
+    """Share of samples that are the goal itself, 0 to 1."""
+    margin: float = 0.01
+    """Distance that the footprint keeps from all that is known [m]."""
+    max_samples: int | None = None
+    """Samples that a plan may take instead of the cycle's time: then a drive is the same on every machine."""
+    tries: int = 6
+    """Plans made while standing, each with twice the time (or samples) of the one before, before the robot gives up."""
+    time_limit: float = 600.0
+    """Time of driving after which the robot stops [s]."""
+
+    def __post_init__(self) -> None:
+        """Check all values together."""
+        problems = [
+            Problem(name, getattr(self, name), "a number above 0")
+            for name in ("sensor_range", "cycle", "time_limit")
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0)
+        ]
+        if not 0.0 <= self.goal_bias <= 1.0:
+            problems.append(Problem("goal_bias", self.goal_bias, "a number from 0 to 1"))
+        if not (math.isfinite(self.margin) and self.margin >= 0.0):
+            problems.append(Problem("margin", self.margin, "a number of 0 or more [m]"))
+        for name in ("max_samples", "tries"):
+            value = getattr(self, name)
+            if value is not None and not (isinstance(value, int) and value >= 1):
+                problems.append(Problem(name, value, "a whole number of 1 or more"))
+        known = [name for name in PLANNERS if law_of(name, PlanningSettings()) != STEERING]
+        if self.planner not in known:
+            problems.append(Problem("planner", self.planner, f"one of {', '.join(known)}"))
+        if problems:
+            raise SettingsError(problems)
+
+    def steps(self, planning: PlanningSettings) -> int:
+        """Planning steps in a cycle.
+
+        Raises:
+            SettingsError: if these are not whole steps.
+        """
+        steps = round(self.cycle / planning.step)
+        if steps < 1 or abs(self.cycle / planning.step - steps) > STEP_TOLERANCE:
+            raise SettingsError(Problem("cycle", self.cycle, f"a multiple of planning.step ({planning.step:g} s)"))
+        return steps
+
+    def planning(self, planning: PlanningSettings) -> PlanningSettings:
+        """Planning settings of a drive: those of its scenario, the goal bias and braking without collision."""
+        return replace(planning, goal_bias=self.goal_bias, **BRAKE_SAFE)
+
+
+def stopping_distance(robot: Robot, step: float) -> float:
+    """Longest way to rest from any velocity that a robot may have [m].
+
+    Args:
+        robot: its limits.
+        step: integration step [s].
+    """
+    limits = robot.limits
+    ways = []
+    for v in (limits.v_min, limits.v_max):
+        for omega in (limits.omega_min, 0.0, limits.omega_max):
+            speeds = np.abs(brake(0.0, 0.0, 0.0, v, omega, limits, step, MAX_STEPS)[:, 3])
+            ways.append(0.5 * step * float((speeds[1:] + speeds[:-1]).sum()))
+    return max(ways)
+
+
+def needed_range(robot: Robot, settings: DriveSettings, step: float) -> float:
+    """Range that a sensor must have, so that all the robot is committed to lies within it [m].
+
+    From one look to the next the robot drives on; what it decides upon meanwhile is one more cycle and the braking
+    after it.
+
+    Args:
+        robot: its footprint and limits.
+        settings: cycle and margin.
+        step: integration step [s].
+    """
+    fastest = max(robot.limits.v_max, -robot.limits.v_min)
+    size = robot.footprint.circumscribed_radius + settings.margin
+    return 2.0 * settings.cycle * fastest + stopping_distance(robot, step) + size
+
+
+def grown(footprint: Footprint, margin: float) -> Footprint:
+    """A footprint with a margin around it.
+
+    Args:
+        footprint: the robot's area.
+        margin: what every point of its border moves out by, at least [m].
+    """
+    if footprint.vertices is None:
+        return Footprint.disc(footprint.radius + margin)
+    if margin == 0.0:
+        return footprint
+    corners = shapely.Polygon(footprint.vertices).buffer(margin, join_style="mitre").exterior
+    return Footprint.polygon(shapely.get_coordinates(corners))

@@ -1,0 +1,278 @@
+"""Driving at speed through what a sensor shows, one cycle at a time.
+
+At every look the robot is already committed to the cycle that begins and to braking after it, both proven free. While it
+drives that cycle, it decides upon the next: a cycle of its plan with the braking after that, if they are free in all that
+is known; else the braking that is ready. The sensor reaches farther than all of that, so nothing unknown is in the way:
+there is always a way to rest that is proven free, and the robot never leaves it.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cbrrt_ompl.clearance_map import clearance_map_for
+from cbrrt_ompl.drive.knowledge import Knowledge
+from cbrrt_ompl.drive.motion_check import is_free
+from cbrrt_ompl.drive.result import LATE, NO_ROOM, REACHED, STOPPED, UNSAFE, Cycle, DriveResult, Replan
+from cbrrt_ompl.drive.settings import DriveSettings, grown, needed_range
+from cbrrt_ompl.errors import Problem, ScenarioError, SettingsError
+from cbrrt_ompl.extension import COMPILED_PLANNERS
+from cbrrt_ompl.obstacles import Obstacle
+from cbrrt_ompl.planning import plan
+from cbrrt_ompl.scenario import Scenario
+from cbrrt_ompl.settings import State
+from cbrrt_ompl.trajectory import Trajectory
+from cbrrt_ompl.warm_up import warm_up
+from cbrrt_ompl.world import World
+
+SEARCH_SHARE = 0.9
+"""Share of the time that is left in which the search has to end; the rest is for checking what it found."""
+
+SHORTEST_SEARCH = 1e-3
+"""Time that every search gets [s]."""
+
+
+class Drive:
+    """A drive, cycle by cycle.
+
+    Attributes:
+        scenario: the true world, with the hidden obstacles last.
+        settings: how to drive.
+        status: ``reached`` or ``stopped``; None while it goes on.
+        cycles: what was seen and decided so far.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        hidden: Sequence[Obstacle] | None = None,
+        settings: DriveSettings | None = None,
+        seed: int | None = None,
+    ) -> None:
+        """Place the robot at the start.
+
+        Args:
+            scenario: known world, robot, start and goal.
+            hidden: obstacles that stand there as well and are unknown until seen; None hides those of the scenario.
+            settings: how to drive; the defaults if not given.
+            seed: of all plans together; None draws a fresh one.
+
+        Raises:
+            SettingsError: if the cycle is not whole planning steps, or the sensor does not reach as far as the robot may
+                be committed.
+            ScenarioError: if an obstacle is nearer to the start than the margin, or in the way of braking from there.
+        """
+        self.settings = settings or DriveSettings()
+        known = World(scenario.world.bounds) if hidden is None else scenario.world
+        found = scenario.world.obstacles if hidden is None else tuple(hidden)
+        if hidden:
+            scenario = replace(scenario, world=World(known.bounds, (*known.obstacles, *found)))
+        self.scenario, self._known = scenario, len(known.obstacles)
+        self._dt, self._cycle_steps = scenario.planning.step, self.settings.steps(scenario.planning)
+        _check_range(scenario, self.settings)
+        self._robot = replace(scenario.robot, footprint=grown(scenario.robot.footprint, self.settings.margin))
+        self._planning = self.settings.planning(scenario.planning)
+        self._knowledge = Knowledge(known, found, self._robot.footprint)
+        self._rng = np.random.default_rng(seed)
+        self._driven = [_at_start(scenario.start)]
+        self._plan: Trajectory | None = None  # the rest of it from now on; None while braking
+        self._committed = self._driven[0].stopping_at(0.0, self._robot.limits, self._dt)
+        self._failures = 0
+        self.status = None if scenario.goal.violations(scenario.start) else REACHED
+        self.cycles: list[Cycle] = []
+        warm_up(needs_ompl=self.settings.planner not in COMPILED_PLANNERS)
+        if not is_free(self._committed.states, self._dt, clearance_map_for(scenario.world, self._robot.footprint)):
+            expected = f"a state with {self.settings.margin:g} m of room (the margin), on the way to rest as well"
+            raise ScenarioError(Problem("start", list(scenario.start), expected))
+
+    @property
+    def time(self) -> float:
+        """Time driven so far [s]."""
+        return self._dt * sum(len(piece) - 1 for piece in self._driven)
+
+    @property
+    def state(self) -> State:
+        """Where the robot is."""
+        return State(*self._driven[-1].states[-1].tolist())
+
+    def run(self, progress: Callable[[float, float], None] | None = None) -> DriveResult:
+        """Drive until the robot is in the goal region or has stopped for good.
+
+        Args:
+            progress: called after every cycle with the time driven [s] and the distance from the goal [m].
+
+        Returns:
+            The result; a robot that has stopped is a status of it and no error.
+        """
+        goal = self.scenario.goal
+        while self.status is None:
+            self.cycle()
+            if progress is not None:
+                progress(self.time, math.hypot(self.state.x - goal.x, self.state.y - goal.y))
+        return DriveResult(
+            status=self.status,
+            trajectory=replace(_joined(self._driven, self._dt), limits=self._robot.limits),
+            braking=_joined([*self._driven, self._committed], self._dt),
+            cycles=tuple(self.cycles),
+            scenario=self.scenario,
+            known=self._known,
+            settings=self.settings,
+        )
+
+    def cycle(self) -> None:
+        """Look, decide what comes after this cycle, and drive it; a robot that stands and has no plan takes longer."""
+        stands = len(self._committed) == 1
+        is_over = self.time >= self.settings.time_limit
+        if stands and (is_over or self._failures == self.settings.tries):
+            self.status = STOPPED
+            return
+        began, looked_at = time.perf_counter(), self.time
+        seen = self._knowledge.look(*self.state[:2], self.settings.sensor_range)
+        portions = 2**self._failures if stands else 1
+        steps = portions * self._cycle_steps
+        piece = _part(self._committed, 0, steps, self._dt)
+        at_goal = self._first_row_at_goal(piece)
+        replan = None
+        if at_goal is not None:
+            piece = _part(piece, 0, at_goal, self._dt)
+            self._committed = _part(self._committed, at_goal, None, self._dt)
+            self.status = REACHED
+        else:
+            is_ready = self._continue_plan(bool(seen))
+            if not is_ready and not is_over:
+                replan = self._replan(State(*piece.states[-1].tolist()), looked_at, portions, began)
+                is_ready = replan.trajectory is not None
+            if not is_ready:
+                self._plan = None
+                self._committed = _part(self._committed, steps, None, self._dt)
+                self._failures += stands
+        self._driven.append(piece)
+        elapsed = time.perf_counter() - began
+        self.cycles.append(Cycle(looked_at, tuple(seen), replan, elapsed, self._plan is None))
+
+    def _first_row_at_goal(self, piece: Trajectory) -> int | None:
+        """The first row of a piece in the goal region."""
+        inside = (row for row, state in enumerate(piece.states.tolist()) if not self._goal_violations(state))
+        return next(inside, None)
+
+    def _goal_violations(self, state: Sequence[float]) -> list[str]:
+        return self.scenario.goal.violations(State(*state))
+
+    def _continue_plan(self, has_seen: bool) -> bool:
+        """Commit to the next cycle of the present plan; False where there is none, or none that is safe and free."""
+        if self._plan is None:
+            return False
+        rest = _part(self._plan, self._cycle_steps, None, self._dt)
+        if has_seen and not self._is_free(rest):
+            return False
+        return self._commit(rest)
+
+    def _replan(self, start: State, looked_at: float, portions: int, began: float) -> Replan:
+        """Plan from where the robot is to be when the plan is ready, and commit to it if it is safe."""
+        settings, knowledge = self.settings, self._knowledge
+        limit, planning = portions * settings.cycle, self._planning
+        seed = int(self._rng.integers(2**31))
+        if settings.max_samples is None:
+            search_limit = max(SEARCH_SHARE * (limit - time.perf_counter() + began), SHORTEST_SEARCH)
+        else:
+            search_limit = math.inf
+            planning = replace(planning, max_samples=portions * settings.max_samples)
+        record = partial(Replan, looked_at, start, looked_at + limit)
+        try:
+            scenario = replace(self.scenario, world=knowledge.world, robot=self._robot, start=start, planning=planning)
+        except ScenarioError:
+            return record(NO_ROOM, 0, 0.0, None)
+        result = plan(scenario, settings.planner, seed, search_limit)
+        status, found = result.status, result.trajectory
+        if found is not None and settings.max_samples is None and time.perf_counter() - began > limit:
+            status, found = LATE, None
+        if found is not None and not self._commit(found):
+            status, found = UNSAFE, None
+        shown = None if found is None else replace(found, t=found.t + looked_at + limit)
+        return record(status, result.samples, result.planning_time, shown)
+
+    def _commit(self, rest: Trajectory) -> bool:
+        """Follow a plan from the next look on, if its first cycle and the braking after that are free."""
+        row = min(self._cycle_steps, len(rest) - 1)
+        committed = rest.stopping_at(rest.t[row], self._robot.limits, self._dt)
+        if not self._is_free(committed):
+            return False
+        self._plan, self._committed = rest, committed
+        if self._failures:
+            self._failures = 0
+        return True
+
+    def _is_free(self, motion: Trajectory) -> bool:
+        """Whether a motion is free in all that is known."""
+        return is_free(motion.states, self._dt, self._knowledge.clearance_map)
+
+
+def drive(
+    scenario: Scenario,
+    hidden: Sequence[Obstacle] | None = None,
+    settings: DriveSettings | None = None,
+    seed: int | None = None,
+    progress: Callable[[float, float], None] | None = None,
+) -> DriveResult:
+    """Drive to the goal through what a sensor shows, planning again whenever something is in the way.
+
+    Args:
+        scenario: known world, robot, start and goal.
+        hidden: obstacles that stand there as well and are unknown until seen; None hides those of the scenario.
+        settings: how to drive; the defaults if not given.
+        seed: of all plans together; None draws a fresh one.
+        progress: see :meth:`Drive.run`.
+
+    Returns:
+        The result; a robot that has stopped is a status of it and no error.
+
+    Raises:
+        SettingsError: see :class:`Drive`.
+        ScenarioError: see :class:`Drive`.
+    """
+    return Drive(scenario, hidden, settings, seed).run(progress)
+
+
+def _check_range(scenario: Scenario, settings: DriveSettings) -> None:
+    """Refuse a sensor that does not see as far as the robot may be committed."""
+    needed = needed_range(scenario.robot, settings, scenario.planning.step)
+    if not settings.sensor_range > needed:
+        expected = f"more than {needed:.4g} m: two cycles at full speed, braking, the robot's size and the margin"
+        raise SettingsError(Problem("sensor_range", settings.sensor_range, expected))
+
+
+def _at_start(start: State) -> Trajectory:
+    """A trajectory of one row."""
+    columns = [np.array([value]) for value in (0.0, *start, start.v, start.omega)]
+    return Trajectory(*columns)
+
+
+def _part(trajectory: Trajectory, first: int, last: int | None, dt: float) -> Trajectory:
+    """Some rows of a trajectory, from time 0 on; one that ends at rest goes on standing as long as is asked for."""
+    states, commands = trajectory.states, np.column_stack([trajectory.v_command, trajectory.omega_command])
+    missing = max(first, last or 0) + 1 - len(trajectory)
+    if missing > 0:
+        commands[-1] = 0.0
+        states = np.concatenate([states, np.repeat(states[-1:], missing, axis=0)])
+        commands = np.concatenate([commands, np.zeros((missing, 2))])
+    rows = slice(first, None if last is None else last + 1)
+    return _from_rows(states[rows], commands[rows], dt)
+
+
+def _joined(pieces: Sequence[Trajectory], dt: float) -> Trajectory:
+    """One trajectory of several, each of which begins where the one before ends."""
+    states = np.concatenate([pieces[0].states[:1], *(piece.states[1:] for piece in pieces)])
+    commands = [np.column_stack([piece.v_command, piece.omega_command])[:-1] for piece in pieces]
+    last = pieces[-1]
+    return _from_rows(states, np.concatenate([*commands, [[last.v_command[-1], last.omega_command[-1]]]]), dt)
+
+
+def _from_rows(states: NDArray[np.float64], commands: NDArray[np.float64], dt: float) -> Trajectory:
+    return Trajectory(dt * np.arange(len(states)), *states.T, *commands.T)
