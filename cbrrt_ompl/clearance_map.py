@@ -10,6 +10,7 @@ is split where the question was.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from cbrrt_ompl.disc_tree import disc_tree
 from cbrrt_ompl.kinematics import sine_cosine
+from cbrrt_ompl.obstacles import Obstacle, bounding_box, signed_distance
 from cbrrt_ompl.robot import Footprint
 from cbrrt_ompl.world import CONTACT_TOLERANCE, MITRE_LIMIT, World
 
@@ -263,6 +265,27 @@ class ClearanceMap:
             self.clearances[1:root:2, 1] = 2.0 * discs[:, 4]
             self._ask_clearance(root, bounds.min[0] + 0.5 * size, bounds.min[1] + 0.5 * size)
 
+    def adopt(self, other: ClearanceMap, added: Sequence[Obstacle]) -> None:
+        """Begin with all that another map knows of the same world without some obstacles.
+
+        A clearance is then the other map's, or the distance from an added obstacle where that is smaller: computed by
+        shapely, whose rounding the margin of the certificates covers as well as FCL's.
+
+        Args:
+            other: a map of the same bounds and footprint.
+            added: the obstacles that its world has not.
+        """
+        self._cells, self.children = other._cells, other.children.copy()
+        self.clearances = other.clearances.copy()
+        leaves = np.flatnonzero(self.children[: self._cells] == 0)
+        for obstacle in added:
+            x, y, clearance = self.clearances[leaves].T
+            x_min, y_min, x_max, y_max = bounding_box(obstacle)
+            dx, dy = np.maximum(x_min - x, x - x_max), np.maximum(y_min - y, y - y_max)
+            near = np.hypot(np.maximum(dx, 0.0), np.maximum(dy, 0.0)) < np.maximum(clearance, SMALLEST_CELL)
+            distance = signed_distance(obstacle, x[near], y[near])
+            self.clearances[leaves[near], 2] = np.minimum(clearance[near], distance)
+
     @property
     def view(self) -> MapView:
         """The map for a kernel, as it is now."""
@@ -395,6 +418,20 @@ def clearance_map_for(world: World, footprint: Footprint) -> ClearanceMap:
     if footprint not in maps:
         maps[footprint] = ClearanceMap(world, footprint)
     return maps[footprint]
+
+
+def extend_map(before: World, world: World, footprint: Footprint) -> ClearanceMap:
+    """The map of a footprint in a world that has some more obstacles than one before; it goes on from that one's map.
+
+    Args:
+        before: the world before.
+        world: the same bounds; the same obstacles first, and some more.
+        footprint: the robot's area.
+    """
+    grown = ClearanceMap(world, footprint)
+    grown.adopt(clearance_map_for(before, footprint), world.obstacles[len(before.obstacles) :])
+    _maps.setdefault(world, {})[footprint] = grown
+    return grown
 
 
 @njit(cache=True)

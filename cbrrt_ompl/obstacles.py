@@ -201,6 +201,35 @@ Obstacle: TypeAlias = Box | OrientedBox | Disc | Polygon
 """What may stand in a world."""
 
 
+def signed_distance(obstacle: Obstacle, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distances of points from an obstacle, minus their depths below its border where they are inside.
+
+    Args:
+        obstacle: any obstacle.
+        x: positions, shape (n,) [m].
+        y: positions, shape (n,) [m].
+
+    Returns:
+        Signed distances, shape (n,) [m].
+    """
+    if isinstance(obstacle, Disc):
+        return np.hypot(x - obstacle.center[0], y - obstacle.center[1]) - obstacle.radius
+    shape, points = obstacle.to_shapely(), shapely.points(x, y)
+    distance = np.asarray(shapely.distance(shape, points))
+    inside = distance == 0.0
+    distance[inside] = -shapely.distance(shape.boundary, points[inside])
+    return distance
+
+
+def bounding_box(obstacle: Obstacle) -> tuple[float, float, float, float]:
+    """The rectangle along the axes around an obstacle: x_min, y_min, x_max, y_max [m]."""
+    if isinstance(obstacle, Disc):
+        (x, y), r = obstacle.center, obstacle.radius
+        return x - r, y - r, x + r, y + r
+    x_min, y_min, x_max, y_max = obstacle.to_shapely().bounds
+    return x_min, y_min, x_max, y_max
+
+
 def polygons_from_shapely(geometry: object) -> list[Polygon]:
     """Obstacles of the area of a shapely geometry.
 

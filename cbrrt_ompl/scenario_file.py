@@ -117,7 +117,8 @@ def _bounds(value: object, path: str, report: Report) -> Bounds | None:
     return build(Bounds, read_section(value, path, _rectangle, report), path, report)
 
 
-def _obstacle(value: object, path: str, report: Report) -> Obstacle | None:
+def obstacle(value: object, path: str, report: Report) -> Obstacle | None:
+    """An obstacle of any type."""
     kinds: dict[str, type] = {"box": Box, "oriented_box": OrientedBox, "disc": Disc, "polygon": Polygon}
     kind = _kind(value, path, OBSTACLES, report)
     return None if kind is None else build(kinds[kind], _shape(value, path, OBSTACLES[kind], report), path, report)
@@ -280,7 +281,7 @@ PLANNING = {
 SCENARIO = {
     "name": Key(text, required="one line of text"),
     "bounds": Key(_bounds),
-    "obstacles": Key(list_of(_obstacle, "a list of obstacles")),
+    "obstacles": Key(list_of(obstacle, "a list of obstacles")),
     "map": Key(_map),
     "robot": Key(_robot),
     "start": Key(_start, required="the state to start in, {x: 0.0, y: 0.0, theta: 0.0} [m, m, rad]"),

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
+from itertools import compress
 
-import shapely
+import numpy as np
 
-from cbrrt_ompl.clearance_map import ClearanceMap, clearance_map_for
-from cbrrt_ompl.obstacles import Disc, Obstacle
+from cbrrt_ompl.clearance_map import ClearanceMap, clearance_map_for, extend_map
+from cbrrt_ompl.obstacles import Obstacle, bounding_box, signed_distance
 from cbrrt_ompl.robot import Footprint
 from cbrrt_ompl.world import World
 
@@ -34,7 +34,7 @@ class Knowledge:
         self.world = world
         self.hidden = list(hidden)
         self._footprint = footprint
-        self._shapes = {id(obstacle): obstacle.to_shapely() for obstacle in hidden}
+        self._boxes = np.array([bounding_box(obstacle) for obstacle in hidden]).reshape(-1, 4)
 
     @property
     def clearance_map(self) -> ClearanceMap:
@@ -52,14 +52,16 @@ class Knowledge:
         Returns:
             The obstacles seen for the first time.
         """
-        seen = [o for o in self.hidden if self._distance(o, x, y) <= sensor_range]
+        here = np.array([x]), np.array([y])
+        x_min, y_min, x_max, y_max = self._boxes.T
+        dx, dy = np.maximum(x_min - x, x - x_max), np.maximum(y_min - y, y - y_max)
+        is_seen = np.hypot(np.maximum(dx, 0.0), np.maximum(dy, 0.0)) <= sensor_range
+        for i in np.flatnonzero(is_seen):
+            is_seen[i] = signed_distance(self.hidden[i], *here)[0] <= sensor_range
+        seen = list(compress(self.hidden, is_seen))
         if seen:
-            self.hidden = [o for o in self.hidden if o not in seen]
-            self.world = World(self.world.bounds, (*self.world.obstacles, *seen))
+            self.hidden = list(compress(self.hidden, ~is_seen))
+            self._boxes = self._boxes[~is_seen]
+            before, self.world = self.world, World(self.world.bounds, (*self.world.obstacles, *seen))
+            extend_map(before, self.world, self._footprint)
         return seen
-
-    def _distance(self, obstacle: Obstacle, x: float, y: float) -> float:
-        """Distance of a point from an obstacle, 0 inside [m]."""
-        if isinstance(obstacle, Disc):
-            return max(math.hypot(x - obstacle.center[0], y - obstacle.center[1]) - obstacle.radius, 0.0)
-        return float(shapely.distance(self._shapes[id(obstacle)], shapely.Point(x, y)))
