@@ -26,8 +26,14 @@ SPACING = 1e-3
 ROBOTS = (
     Robot(Footprint.disc(0.2), Limits(0.0, 1.0, -1.0, 1.0, 0.6, 1.5)),
     Robot(Footprint.disc(0.3), Limits(0.0, 2.0, -2.0, 2.0, 2.0, 6.0), Gains(1.5, 2.0, 1.0)),
-    Robot(Footprint.polygon([[-0.2, -0.15], [0.3, -0.15], [0.3, 0.15], [-0.2, 0.15]]), Limits(-0.5, 1.0, -1, 1, 0.6, 1.5)),
-    Robot(Footprint.polygon([[-0.25, -0.2], [0.25, -0.2], [0.25, 0.2], [-0.25, 0.2]]), Limits(0.0, 1.5, -2, 2, 1.0, 4.0)),
+    Robot(
+        Footprint.polygon([[-0.2, -0.15], [0.3, -0.15], [0.3, 0.15], [-0.2, 0.15]]),
+        Limits(-0.5, 1.0, -1.0, 1.0, 0.6, 1.5),
+    ),
+    Robot(
+        Footprint.polygon([[-0.25, -0.2], [0.25, -0.2], [0.25, 0.2], [-0.25, 0.2]]),
+        Limits(0.0, 1.5, -2.0, 2.0, 1.0, 4.0),
+    ),
 )
 """Round ones and such with corners, slow and fast, one of which can reverse."""
 
@@ -59,9 +65,9 @@ def touches(result: DriveResult) -> bool:
     reach = robot.footprint.circumscribed_radius
     v, _, omega, _ = np.abs(trajectory.step_velocities)
     v_end, omega_end = np.abs(trajectory.v[1:]), np.abs(trajectory.omega[1:])
-    steps = np.diff(trajectory.t)
+    steps, begins = np.diff(trajectory.t), trajectory.t[:-1]
     parts = np.ceil(steps * (np.maximum(v, v_end) + reach * np.maximum(omega, omega_end)) / SPACING).astype(int) + 1
-    times = np.concatenate([t + dt * np.arange(n) / n for t, dt, n in zip(trajectory.t, steps, parts)])
+    times = np.concatenate([t + dt * np.arange(n) / n for t, dt, n in zip(begins, steps, parts, strict=True)])
     checker = result.scenario.world.checker(robot.footprint)
     return any(checker.collides(*pose) for pose in trajectory.at(np.append(times, trajectory.t[-1]))[:, :3].tolist())
 
@@ -102,7 +108,7 @@ def main() -> None:
     reached = [result for result in results if result.reached]
     replans = [replan for result in results for replan in result.replans]
     planning = 1e3 * np.array([replan.planning_time for replan in replans])
-    at_speed = [c for r in results for c in r.cycles if c.replan and (c.replan.start.v != 0.0 or c.replan.start.omega != 0.0)]
+    at_speed = [c for r in results for c in r.cycles if c.replan and any(c.replan.start[3:])]
     computing = 1e3 * np.array([cycle.computing_time for cycle in at_speed])
     quiet = 1e3 * np.array([c.computing_time for r in results for c in r.cycles if c.replan is None])
     print(f"worlds                       {len(results)} in {time.perf_counter() - began:.0f} s")
@@ -116,7 +122,7 @@ def main() -> None:
     print(f"smallest clearance           {min(result.smallest_clearance for result in results):.4f} m")
     for name, values in (("search", planning), ("cycle with plan at speed", computing), ("cycle without plan", quiet)):
         median, high, most = np.quantile(values, (0.5, 0.95, 1.0))
-        print(f"{name + ' [ms]':<29}median {median:.2f}, 95 % {high:.2f}, max {most:.1f}  (cycle: {1e3 * arguments.cycle:g})")
+        print(f"{name + ' [ms]':<29}median {median:.2f}, 95 % {high:.2f}, max {most:.1f}")
 
 
 if __name__ == "__main__":

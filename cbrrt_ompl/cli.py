@@ -1,4 +1,4 @@
-"""The command line: ``cbrrt plan | verify | show | planners | bench | report | reproduce | demo | completion``.
+"""The command line: ``cbrrt plan | drive | verify | show | planners | bench | report | reproduce | demo | completion``.
 
 Exit codes: 0 done, 1 not solved or not verified, 2 bad input, 130 interrupted. Modules that take long to import are
 imported where they are used, so that ``cbrrt --help`` answers at once.
@@ -27,11 +27,13 @@ if TYPE_CHECKING:
 
     from cbrrt_ompl.benchmark.report import Report
     from cbrrt_ompl.demo import DemoRun
+    from cbrrt_ompl.drive import DriveResult
     from cbrrt_ompl.planning import PlanResult
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED, BROKEN_PIPE = 0, 1, 2, 130, 141
 TRAJECTORY_SUFFIXES = (".csv", ".npz", ".json")
 FIGURE_SUFFIXES = (".png", ".pdf", ".svg")
+ANIMATION_SUFFIXES = (".gif", ".html", ".mp4")
 DATABASE_SUFFIXES = (".db", ".sqlite", ".sqlite3")
 SHELLS = ("bash", "zsh", "tcsh")
 LINE_WIDTH = 80
@@ -42,6 +44,7 @@ EXAMPLES = """\
 examples:
   cbrrt plan paper_case1 --seed 1 --figure case1.png   a scene of the paper
   cbrrt plan depot.yaml --planner cb-rrt-robust --trajectory depot.csv
+  cbrrt drive office --seed 2 --animation office.gif   plan again on the way
   cbrrt verify depot.csv depot.yaml                    check it by other code
   cbrrt bench maze office --runs 20 --database bench.db --log-dir logs
   cbrrt report bench.db --output report                tables and charts
@@ -85,6 +88,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action=_Version, help="print the version and exit")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_plan(commands)
+    _add_drive(commands)
     _add_verify(commands)
     _add_show(commands)
     _add_planners(commands)
@@ -107,6 +111,44 @@ def _add_plan(commands: Any) -> None:
     )
     parser.add_argument("--trajectory", type=Path, metavar="FILE", help="write the trajectory: .csv, .npz or .json")
     parser.add_argument("--figure", type=Path, metavar="FILE", help="draw scene, tree and path: .png, .pdf or .svg")
+    parser.add_argument("--animation", type=Path, metavar="FILE", help="show the robot drive: .gif, .html or .mp4")
+    _add_json(parser)
+
+
+def _add_drive(commands: Any) -> None:
+    example = "cbrrt drive office --sensor-range 2.5 --seed 2 --animation office.gif"
+    summary = "drive through a world known within a sensor's range only, planning on the way"
+    parser = _add_command(commands, "drive", _drive, summary, example)
+    parser.add_argument("scenario", type=Path, metavar="SCENARIO", help=SCENARIO_HELP)
+    hidden = parser.add_mutually_exclusive_group()
+    hidden.add_argument(
+        "--unknown", type=_count, metavar="N",
+        help="know the scenario, but not N random obstacles (default: none of the scenario's obstacles is known)",
+    )  # fmt: skip
+    hidden.add_argument(
+        "--hidden", type=Path, metavar="FILE", help="know the scenario, but not the obstacles of this file (YAML)"
+    )
+    parser.add_argument(
+        "--sensor-range", type=_metres, default=3.0, metavar="R", help="how far the robot sees [m] (default: 3)"
+    )
+    parser.add_argument(
+        "--cycle",
+        type=_seconds,
+        default=0.1,
+        metavar="S",
+        help="time between two looks, and of a plan [s] (default: 0.1)",
+    )
+    parser.add_argument(
+        "--planner", default="cb-rrt-robust", metavar="NAME", help="see 'cbrrt planners' (default: cb-rrt-robust)"
+    )
+    parser.add_argument("--seed", type=_seed, metavar="N", help="seed of the random numbers (default: a new one)")
+    parser.add_argument(
+        "--max-samples", type=_count, metavar="N",
+        help="samples of a plan at most, instead of the cycle's time: the same drive on every machine",
+    )  # fmt: skip
+    parser.add_argument("--trajectory", type=Path, metavar="FILE", help="write the way driven: .csv, .npz or .json")
+    parser.add_argument("--figure", type=Path, metavar="FILE", help="draw the drive: .png, .pdf or .svg")
+    parser.add_argument("--animation", type=Path, metavar="FILE", help="show the drive: .gif, .html or .mp4")
     _add_json(parser)
 
 
@@ -209,9 +251,7 @@ def _add_json(parser: argparse.ArgumentParser) -> None:
 
 def _plan(arguments: argparse.Namespace) -> int:
     """``cbrrt plan``."""
-    _check_outputs(
-        ("--trajectory", arguments.trajectory, TRAJECTORY_SUFFIXES), ("--figure", arguments.figure, FIGURE_SUFFIXES)
-    )
+    _check_plan_outputs(arguments)
     from cbrrt_ompl.planning import plan
     from cbrrt_ompl.scenario import load_scenario
 
@@ -227,6 +267,10 @@ def _plan(arguments: argparse.Namespace) -> int:
         from cbrrt_ompl.figures import draw_plan
 
         draw_plan(result, scenario).savefig(arguments.figure)
+    if arguments.animation is not None and result.trajectory is not None:
+        from cbrrt_ompl.animation import animate, save_animation
+
+        save_animation(animate(result.trajectory, scenario, result.tree), arguments.animation)
     if arguments.json:
         _print_json(_json_result(scenario.name, result, written, arguments.figure))
     else:
@@ -234,6 +278,45 @@ def _plan(arguments: argparse.Namespace) -> int:
         if arguments.trajectory is not None and written is None:
             print(f"no trajectory, {arguments.trajectory} not written")
     return DONE if result.solved else FAILED
+
+
+def _drive(arguments: argparse.Namespace) -> int:
+    """``cbrrt drive``."""
+    _check_plan_outputs(arguments)
+    from cbrrt_ompl.drive import DriveSettings, drive
+    from cbrrt_ompl.drive.unknown import load_obstacles, unknown_obstacles
+    from cbrrt_ompl.scenario import load_scenario
+
+    scenario = load_scenario(arguments.scenario)
+    settings = DriveSettings(
+        sensor_range=arguments.sensor_range,
+        cycle=arguments.cycle,
+        planner=arguments.planner,
+        max_samples=arguments.max_samples,
+    )
+    hidden = None
+    if arguments.unknown is not None:
+        hidden = unknown_obstacles(scenario, arguments.unknown, arguments.seed, settings.margin)
+    elif arguments.hidden is not None:
+        hidden = load_obstacles(arguments.hidden)
+    _warm_up(arguments.planner)
+    result = drive(scenario, hidden, settings, arguments.seed)
+    if arguments.trajectory is not None:
+        result.trajectory.save(arguments.trajectory)
+    if arguments.figure is not None:
+        from cbrrt_ompl.figures import draw_drive
+
+        draw_drive(result).savefig(arguments.figure)
+    if arguments.animation is not None:
+        from cbrrt_ompl.animation import animate_drive, save_animation
+
+        save_animation(animate_drive(result), arguments.animation)
+    figures = _drive_figures(result)
+    if arguments.json:
+        _print_json({"scenario": scenario.name, "seed": arguments.seed, **figures})
+    else:
+        _print_drive(scenario.name, figures)
+    return DONE if result.reached else FAILED
 
 
 def _warm_up(planner: str) -> None:
@@ -507,6 +590,47 @@ def _print_summary(scenario: str, result: PlanResult) -> None:
         print(f"{name:{width}}  {value}")
 
 
+def _drive_figures(result: DriveResult) -> dict[str, Any]:
+    """What came of a drive, in SI units."""
+    verification = result.verification
+    return {
+        "planner": result.settings.planner,
+        "status": result.status,
+        "reached": result.reached,
+        "duration": result.trajectory.duration,
+        "length": result.trajectory.length,
+        "plans": len(result.replans),
+        "plans_taken": sum(replan.trajectory is not None for replan in result.replans),
+        "obstacles_found": sum(len(cycle.seen) for cycle in result.cycles),
+        "obstacles_hidden": len(result.hidden),
+        "cycle": result.settings.cycle,
+        "longest_search": max((replan.planning_time for replan in result.replans), default=0.0),
+        "longest_computing": max((cycle.computing_time for cycle in result.cycles), default=0.0),
+        "smallest_clearance": verification.smallest_clearance,
+        "violations": [violation.message for violation in verification.violations],
+    }
+
+
+def _print_drive(scenario: str, figures: dict[str, Any]) -> None:
+    """Print what came of a drive, a value a line."""
+    violations = figures["violations"]
+    rows = (
+        ("scenario", scenario),
+        ("planner", figures["planner"]),
+        ("status", _colored(figures["status"], GREEN if figures["reached"] else RED)),
+        ("duration", f"{figures['duration']:.2f} s"),
+        ("length", f"{figures['length']:.2f} m"),
+        ("plans", f"{figures['plans']}, {figures['plans_taken']} taken"),
+        ("obstacles found", f"{figures['obstacles_found']} of {figures['obstacles_hidden']} hidden"),
+        ("longest search", f"{1e3 * figures['longest_search']:.1f} ms, cycle {1e3 * figures['cycle']:g} ms"),
+        ("longest computing", f"{1e3 * figures['longest_computing']:.1f} ms"),
+        ("smallest clearance", f"{figures['smallest_clearance']:.3f} m"),
+        ("verified", "valid" if not violations else "NOT VALID: " + "; ".join(violations)),
+    )
+    for name, value in rows:
+        print(f"{name:18}  {value}")
+
+
 def _json_result(
     scenario: str, result: PlanResult, trajectory_file: Path | None, figure_file: Path | None
 ) -> dict[str, Any]:
@@ -583,6 +707,23 @@ def _check_outputs(*outputs: tuple[str, Path | None, tuple[str, ...]]) -> None:
         raise InputError(problems)
 
 
+def _check_plan_outputs(arguments: argparse.Namespace) -> None:
+    """Find out before any work whether trajectory, figure and animation can be written.
+
+    Raises:
+        InputError: with every file that cannot be written, or for a kind of animation that needs a program.
+    """
+    _check_outputs(
+        ("--trajectory", arguments.trajectory, TRAJECTORY_SUFFIXES),
+        ("--figure", arguments.figure, FIGURE_SUFFIXES),
+        ("--animation", arguments.animation, ANIMATION_SUFFIXES),
+    )
+    if arguments.animation is not None:
+        from cbrrt_ompl.animation import check_animation_file
+
+        check_animation_file(arguments.animation)
+
+
 def _print_error(error: CbrrtError | OSError) -> None:
     """Print an error on stderr, every problem on a line of its own."""
     text = str(error)
@@ -622,6 +763,17 @@ def _seconds(text: str) -> float:
     if not (math.isfinite(seconds) and seconds > 0.0):
         raise argparse.ArgumentTypeError(f"got {text!r}, expected a number of seconds above 0")
     return seconds
+
+
+def _metres(text: str) -> float:
+    """A distance from the command line [m]."""
+    try:
+        metres = float(text)
+    except ValueError:
+        metres = math.nan
+    if not (math.isfinite(metres) and metres > 0.0):
+        raise argparse.ArgumentTypeError(f"got {text!r}, expected a number of metres above 0")
+    return metres
 
 
 def _count(text: str) -> int:

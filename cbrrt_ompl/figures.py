@@ -29,6 +29,7 @@ from cbrrt_ompl.tree import Tree
 from cbrrt_ompl.world import World
 
 if TYPE_CHECKING:
+    from cbrrt_ompl.drive.result import DriveResult
     from cbrrt_ompl.planning import PlanResult
     from cbrrt_ompl.scenario import Scenario
 
@@ -47,17 +48,18 @@ FOOTPRINTS_ALONG_PATH = 20
 _HALO = [patheffects.withStroke(linewidth=3.4, foreground="white")]
 
 
-def draw_world(ax: Axes, world: World) -> Axes:
+def draw_world(ax: Axes, world: World, first: int | None = None) -> Axes:
     """Draw bounds and obstacles, the obstacles as one collection.
 
     Args:
         ax: axes of the plane; their limits and labels are set.
         world: what is drawn.
+        first: draw only so many of the obstacles, the first ones.
 
     Returns:
         The axes.
     """
-    paths = [_path(obstacle) for obstacle in world.obstacles]
+    paths = [obstacle_path(obstacle) for obstacle in world.obstacles[:first]]
     solids = PathCollection(paths, facecolor=OBSTACLE_COLOR, edgecolor=OBSTACLE_COLOR, linewidth=0.4, zorder=1)
     solids.set_label("obstacle" if paths else "_nolegend_")
     ax.add_collection(solids, autolim=False)
@@ -75,17 +77,18 @@ def draw_world(ax: Axes, world: World) -> Axes:
     return ax
 
 
-def draw_scene(ax: Axes, scenario: Scenario) -> Axes:
+def draw_scene(ax: Axes, scenario: Scenario, first: int | None = None) -> Axes:
     """Draw the world, the footprint and heading at the start, and the goal region.
 
     Args:
         ax: axes of the plane; their limits and labels are set.
         scenario: what is drawn.
+        first: draw only so many of the obstacles, the first ones.
 
     Returns:
         The axes.
     """
-    draw_world(ax, scenario.world)
+    draw_world(ax, scenario.world, first)
     mark = 0.05 * max(scenario.world.bounds.size)  # length of a heading mark [m]
     _draw_start(ax, scenario, mark)
     _draw_goal(ax, scenario, mark)
@@ -352,12 +355,140 @@ def draw_plan(result: PlanResult, scenario: Scenario) -> Figure:
         draw_velocities((upper, lower), trajectory, scenario.robot.limits)
         upper.tick_params(labelbottom=False)
         figure.align_ylabels((upper, lower))
-        _legend_above(upper)
+        legend_above(upper)
     draw_scene(plane, scenario)
     draw_tree(plane, result.tree)
     if trajectory is not None:
         draw_trajectory(plane, trajectory, scenario.robot.footprint)
-    _legend_above(plane)
+    legend_above(plane)
+    for ax in figure.axes:
+        ax.tick_params(labelsize=8)
+        ax.xaxis.label.set_fontsize(9)
+        ax.yaxis.label.set_fontsize(9)
+    return figure
+
+
+def draw_unknown(ax: Axes, result: DriveResult) -> tuple[PathCollection, PathCollection]:
+    """Draw the obstacles that a drive did not know at its start.
+
+    Args:
+        ax: axes of the plane.
+        result: what :func:`cbrrt_ompl.drive.drive` returned.
+
+    Returns:
+        Those never seen, as dotted outlines, and those found on the way, hatched.
+    """
+    found = {id(obstacle) for cycle in result.cycles for obstacle in cycle.seen}
+    unseen = PathCollection(
+        [obstacle_path(o) for o in result.hidden if id(o) not in found],
+        facecolor="none",
+        edgecolor="0.45",
+        linestyle=":",
+        linewidth=0.9,
+        zorder=1.0,
+        label="unknown",
+    )
+    seen = PathCollection(
+        [obstacle_path(o) for o in result.hidden if id(o) in found],
+        facecolor="0.85",
+        edgecolor="0.15",
+        hatch="/////",
+        linewidth=0.9,
+        zorder=1.1,
+        label="found",
+    )
+    for collection in (unseen, seen):
+        ax.add_collection(collection, autolim=False)
+    return unseen, seen
+
+
+def draw_computing_times(ax: Axes, result: DriveResult) -> Axes:
+    """Draw what the cycles of a drive took to compute, over time, against the time of a cycle.
+
+    Args:
+        ax: axes; the time is on a logarithmic scale.
+        result: what :func:`cbrrt_ompl.drive.drive` returned.
+
+    Returns:
+        The axes.
+    """
+    times = np.array([cycle.time for cycle in result.cycles])
+    computing = 1e3 * np.maximum(result.computing_times, 1e-5)
+    limit = 1e3 * result.settings.cycle
+    ax.axhline(limit, color="black", linestyle="--", linewidth=0.9, label="cycle time")
+    ax.plot(times, computing, color=COMMAND_COLOR, linewidth=0.8, label="all computing")
+    for is_taken, marker, color, label in ((True, "o", PATH_COLOR, "plan"), (False, "X", TREE_COLOR, "no plan")):
+        replans = [replan for replan in result.replans if (replan.trajectory is not None) == is_taken]
+        if replans:
+            ax.plot(
+                [replan.time for replan in replans],
+                [1e3 * max(replan.planning_time, 1e-5) for replan in replans],
+                linestyle="none",
+                marker=marker,
+                markersize=4.5,
+                markerfacecolor=color,
+                markeredgecolor="white",
+                markeredgewidth=0.5,
+                label=label,
+            )
+    ax.set_yscale("log")
+    ax.set_ylim(0.05, 40.0 * max(limit, float(computing.max(initial=0.0))))  # room for the legend
+    ax.legend(loc="upper center", ncols=4, fontsize=7.0, frameon=False, handlelength=1.6, columnspacing=1.2)
+    ax.set_ylabel("computing [ms]")
+    ax.set_xlabel("t [s]")
+    ax.grid(True, linewidth=0.4, color="0.88")
+    ax.set_axisbelow(True)
+    return ax
+
+
+def draw_drive(result: DriveResult) -> Figure:
+    """Draw what came of a drive: the world, what was found, the way and the places of the plans, beside three curves.
+
+    Args:
+        result: what :func:`cbrrt_ompl.drive.drive` returned.
+
+    Returns:
+        A figure of its own, not known to pyplot, as wide as two columns of a paper.
+    """
+    scenario, trajectory = result.scenario, result.trajectory
+    width, height = scenario.world.bounds.size
+    tall = min(max(3.7 * height / width, 3.6), 6.0)
+    figure = Figure(figsize=(7.6, tall + 0.9), layout="constrained", dpi=150)
+    taken = sum(replan.trajectory is not None for replan in result.replans)
+    figure.suptitle(
+        f"{textwrap.fill(f'{scenario.name}, {result.settings.planner}', 56)}\n{result.status} after "
+        f"{trajectory.duration:.2f} s, {taken} plans taken of {len(result.replans)}",
+        fontsize=9,
+        parse_math=False,
+    )
+    grid = figure.add_gridspec(3, 2, width_ratios=(1.25, 1.0))
+    plane = figure.add_subplot(grid[:, 0])
+    upper = figure.add_subplot(grid[0, 1])
+    lower, clock = (figure.add_subplot(grid[row, 1], sharex=upper) for row in (1, 2))
+    draw_scene(plane, scenario, result.known)
+    draw_unknown(plane, result)
+    draw_trajectory(plane, trajectory, scenario.robot.footprint)
+    starts = np.array([replan.start[:2] for replan in result.replans if replan.trajectory is not None]).reshape(-1, 2)
+    plane.plot(
+        *starts.T,
+        linestyle="none",
+        marker="D",
+        markersize=4.5,
+        color="white",
+        markeredgecolor="black",
+        zorder=5.5,
+        scalex=False,
+        scaley=False,
+        label="new plan",
+    )
+    draw_velocities((upper, lower), trajectory, scenario.robot.limits)
+    lower.set_xlabel("")
+    draw_computing_times(clock, result)
+    for ax in (upper, lower):
+        ax.tick_params(labelbottom=False)
+    figure.align_ylabels((upper, lower, clock))
+    for ax in (plane, upper):
+        legend_above(ax)
     for ax in figure.axes:
         ax.tick_params(labelsize=8)
         ax.xaxis.label.set_fontsize(9)
@@ -374,7 +505,7 @@ def plan_title(result: PlanResult, scenario: Scenario) -> str:
     )
 
 
-def _legend_above(ax: Axes) -> None:
+def legend_above(ax: Axes) -> None:
     """Put the legend above the axes, where no data are."""
     handles, labels = ax.get_legend_handles_labels()
     shown = {label: handle for handle, label in zip(handles, labels, strict=True)}
@@ -392,7 +523,7 @@ def _legend_above(ax: Axes) -> None:
     )
 
 
-def _path(obstacle: Obstacle) -> Path:
+def obstacle_path(obstacle: Obstacle) -> Path:
     """Outline of an obstacle in the world, with its holes."""
     if isinstance(obstacle, Box):
         (x0, y0), (x1, y1) = obstacle.min, obstacle.max

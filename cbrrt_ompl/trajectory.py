@@ -234,7 +234,9 @@ class Trajectory:
 
         if self.kinematic:
             return np.array([self.states[row], [*self.poses[row], 0.0, 0.0]])
-        states = brake(*self.states[row].tolist(), limits, step, MAX_STEPS)
+        assert limits is not None
+        x, y, theta, v, omega = self.states[row].tolist()
+        states = brake(x, y, theta, v, omega, limits, step, MAX_STEPS)
         if len(states) > MAX_STEPS:
             expected = f"a step in which {MAX_STEPS} of them bring the robot to rest"
             raise TrajectoryError(Problem("step", step, expected))

@@ -1,9 +1,9 @@
 """Driving at speed through what a sensor shows, one cycle at a time.
 
-At every look the robot is already committed to the cycle that begins and to braking after it, both proven free. While it
-drives that cycle, it decides upon the next: a cycle of its plan with the braking after that, if they are free in all that
-is known; else the braking that is ready. The sensor reaches farther than all of that, so nothing unknown is in the way:
-there is always a way to rest that is proven free, and the robot never leaves it.
+At every look the robot is already committed to the cycle that begins and to braking after it, both proven free. While
+it drives that cycle, it decides upon the next: a cycle of its plan with the braking after that, if they are free in all
+that is known; else the braking that is ready. The sensor reaches farther than all of that, so nothing unknown is in the
+way: there is always a way to rest that is proven free, and the robot never leaves it.
 """
 
 from __future__ import annotations
@@ -65,8 +65,8 @@ class Drive:
             seed: of all plans together; None draws a fresh one.
 
         Raises:
-            SettingsError: if the cycle is not whole planning steps, or the sensor does not reach as far as the robot may
-                be committed.
+            SettingsError: if the cycle is not whole planning steps, or the sensor does not reach as far as the robot
+                may be committed.
             ScenarioError: if an obstacle is nearer to the start than the margin, or in the way of braking from there.
         """
         self.settings = settings or DriveSettings()
@@ -205,8 +205,7 @@ class Drive:
         if not self._is_free(committed):
             return False
         self._plan, self._committed = rest, committed
-        if self._failures:
-            self._failures = 0
+        self._failures = 0
         return True
 
     def _is_free(self, motion: Trajectory) -> bool:
@@ -275,4 +274,5 @@ def _joined(pieces: Sequence[Trajectory], dt: float) -> Trajectory:
 
 
 def _from_rows(states: NDArray[np.float64], commands: NDArray[np.float64], dt: float) -> Trajectory:
-    return Trajectory(dt * np.arange(len(states)), *states.T, *commands.T)
+    t: NDArray[np.float64] = dt * np.arange(len(states), dtype=np.float64)
+    return Trajectory(t, *states.T, *commands.T)
