@@ -112,7 +112,7 @@ def animate_drive(result: DriveResult) -> FuncAnimation:
     curves = _Curves((upper, lower), trajectory, scenario)
     draw_computing_times(clock, result)
     cursor = clock.axvline(trajectory.t[0], color="black", linewidth=0.7)
-    future = clock.axvspan(trajectory.t[0], trajectory.t[-1], color="white", alpha=0.85, linewidth=0.0, zorder=5)
+    future = clock.axvspan(trajectory.t[0], trajectory.t[-1], ymax=0.78, color="white", alpha=0.85, linewidth=0.0)
     lower.set_xlabel("")
     legend_above(plane)
     title = _Title(figure, scenario.name, trajectory)
