@@ -68,7 +68,7 @@ def touches(result: DriveResult) -> bool:
     steps, begins = np.diff(trajectory.t), trajectory.t[:-1]
     parts = np.ceil(steps * (np.maximum(v, v_end) + reach * np.maximum(omega, omega_end)) / SPACING).astype(int) + 1
     times = np.concatenate([t + dt * np.arange(n) / n for t, dt, n in zip(begins, steps, parts, strict=True)])
-    checker = result.scenario.world.checker(robot.footprint)
+    checker = result.world.checker(robot.footprint)
     return any(checker.collides(*pose) for pose in trajectory.at(np.append(times, trajectory.t[-1]))[:, :3].tolist())
 
 
@@ -92,7 +92,7 @@ def main() -> None:
             scenario = replace(scenario, world=World(scenario.world.bounds))
         result = drive(scenario, hidden, settings, seed=world)
         results.append(result)
-        known = replace(result.scenario, planning=settings.planning(scenario.planning))
+        known = replace(scenario, world=result.world, planning=settings.planning(scenario.planning))
         solved = plan(known, settings.planner, seed=world, time_limit=2.0).solved
         possible += solved or result.reached
         if touches(result):

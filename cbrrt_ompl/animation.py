@@ -102,7 +102,7 @@ def animate_drive(result: DriveResult) -> FuncAnimation:
     """
     scenario, trajectory = result.scenario, result.trajectory
     figure, plane, (upper, lower, clock) = _axes(scenario, rows=3)
-    draw_scene(plane, scenario, result.known)
+    draw_scene(plane, scenario)
     unseen, seen = draw_unknown(plane, result)
     (plan,) = plane.plot([], [], color=PATH_COLOR, linewidth=1.0, zorder=3.5, label="plan")
     (braking,) = plane.plot([], [], color=TREE_COLOR, linewidth=3.0, zorder=4.5, label="braking, ready")

@@ -48,18 +48,17 @@ FOOTPRINTS_ALONG_PATH = 20
 _HALO = [patheffects.withStroke(linewidth=3.4, foreground="white")]
 
 
-def draw_world(ax: Axes, world: World, first: int | None = None) -> Axes:
+def draw_world(ax: Axes, world: World) -> Axes:
     """Draw bounds and obstacles, the obstacles as one collection.
 
     Args:
         ax: axes of the plane; their limits and labels are set.
         world: what is drawn.
-        first: draw only so many of the obstacles, the first ones.
 
     Returns:
         The axes.
     """
-    paths = [obstacle_path(obstacle) for obstacle in world.obstacles[:first]]
+    paths = [obstacle_path(obstacle) for obstacle in world.obstacles]
     solids = PathCollection(paths, facecolor=OBSTACLE_COLOR, edgecolor=OBSTACLE_COLOR, linewidth=0.4, zorder=1)
     solids.set_label("obstacle" if paths else "_nolegend_")
     ax.add_collection(solids, autolim=False)
@@ -77,18 +76,17 @@ def draw_world(ax: Axes, world: World, first: int | None = None) -> Axes:
     return ax
 
 
-def draw_scene(ax: Axes, scenario: Scenario, first: int | None = None) -> Axes:
+def draw_scene(ax: Axes, scenario: Scenario) -> Axes:
     """Draw the world, the footprint and heading at the start, and the goal region.
 
     Args:
         ax: axes of the plane; their limits and labels are set.
         scenario: what is drawn.
-        first: draw only so many of the obstacles, the first ones.
 
     Returns:
         The axes.
     """
-    draw_world(ax, scenario.world, first)
+    draw_world(ax, scenario.world)
     mark = 0.05 * max(scenario.world.bounds.size)  # length of a heading mark [m]
     _draw_start(ax, scenario, mark)
     _draw_goal(ax, scenario, mark)
@@ -465,7 +463,7 @@ def draw_drive(result: DriveResult) -> Figure:
     plane = figure.add_subplot(grid[:, 0])
     upper = figure.add_subplot(grid[0, 1])
     lower, clock = (figure.add_subplot(grid[row, 1], sharex=upper) for row in (1, 2))
-    draw_scene(plane, scenario, result.known)
+    draw_scene(plane, scenario)
     draw_unknown(plane, result)
     draw_trajectory(plane, trajectory, scenario.robot.footprint)
     starts = np.array([replan.start[:2] for replan in result.replans if replan.trajectory is not None]).reshape(-1, 2)

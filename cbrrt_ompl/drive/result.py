@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -12,9 +11,10 @@ from numpy.typing import NDArray
 from cbrrt_ompl.drive.settings import DriveSettings
 from cbrrt_ompl.obstacles import Obstacle
 from cbrrt_ompl.scenario import Scenario
-from cbrrt_ompl.settings import State
+from cbrrt_ompl.settings import Goal, State
 from cbrrt_ompl.trajectory import Trajectory
 from cbrrt_ompl.verification import Verification, verify
+from cbrrt_ompl.world import World
 
 REACHED, STOPPED = "reached", "stopped"
 """How a drive ends."""
@@ -73,9 +73,11 @@ class DriveResult:
     cycles: tuple[Cycle, ...]
     """Everything that was seen and decided, in order."""
     scenario: Scenario
-    """The true world, with the hidden obstacles behind those known at the start."""
-    known: int
-    """How many obstacles of the scenario were known at the start: the first ones."""
+    """What was driven, in the world as it was known at the start."""
+    hidden: tuple[Obstacle, ...]
+    """The obstacles that were not known at the start."""
+    world: World
+    """The true world."""
     settings: DriveSettings
     """How it was driven."""
 
@@ -90,11 +92,6 @@ class DriveResult:
         return [cycle.replan for cycle in self.cycles if cycle.replan is not None]
 
     @property
-    def hidden(self) -> Sequence[Obstacle]:
-        """The obstacles that were not known at the start."""
-        return self.scenario.world.obstacles[self.known :]
-
-    @property
     def planning_times(self) -> NDArray[np.float64]:
         """Times of the searches, shape (n,) [s]."""
         return np.array([replan.planning_time for replan in self.replans])
@@ -106,11 +103,10 @@ class DriveResult:
 
     @cached_property
     def verification(self) -> Verification:
-        """The way driven, verified in the true world; that a stopped robot is not at the goal is no violation."""
-        found = verify(self.trajectory, self.scenario)
-        if self.reached:
-            return found
-        return replace(found, violations=tuple(v for v in found.violations if v.kind != "goal"))
+        """The way driven, verified in the true world; where the robot stopped, its end takes the place of the goal."""
+        x, y = self.trajectory.poses[-1, :2].tolist()
+        goal = self.scenario.goal if self.reached else Goal(x, y)
+        return verify(self.trajectory, replace(self.scenario, world=self.world, goal=goal))
 
     @property
     def smallest_clearance(self) -> float:

@@ -43,7 +43,9 @@ class Drive:
     """A drive, cycle by cycle.
 
     Attributes:
-        scenario: the true world, with the hidden obstacles last.
+        scenario: what is driven, in the world as it is known at the start.
+        hidden: the obstacles that are not known at the start.
+        world: the true world, with the hidden obstacles last.
         settings: how to drive.
         status: ``reached`` or ``stopped``; None while it goes on.
         cycles: what was seen and decided so far.
@@ -71,15 +73,14 @@ class Drive:
         """
         self.settings = settings or DriveSettings()
         known = World(scenario.world.bounds) if hidden is None else scenario.world
-        found = scenario.world.obstacles if hidden is None else tuple(hidden)
-        if hidden:
-            scenario = replace(scenario, world=World(known.bounds, (*known.obstacles, *found)))
-        self.scenario, self._known = scenario, len(known.obstacles)
+        self.hidden = tuple(scenario.world.obstacles if hidden is None else hidden)
+        self.scenario = replace(scenario, world=known)
+        self.world = World(known.bounds, (*known.obstacles, *self.hidden)) if hidden else scenario.world
         self._dt, self._cycle_steps = scenario.planning.step, self.settings.steps(scenario.planning)
         _check_range(scenario, self.settings)
         self._robot = replace(scenario.robot, footprint=grown(scenario.robot.footprint, self.settings.margin))
         self._planning = self.settings.planning(scenario.planning)
-        self._knowledge = Knowledge(known, found, self._robot.footprint)
+        self._knowledge = Knowledge(known, self.hidden, self._robot.footprint)
         self._rng = np.random.default_rng(seed)
         self._driven = [_at_start(scenario.start)]
         self._plan: Trajectory | None = None  # the rest of it from now on; None while braking
@@ -88,7 +89,7 @@ class Drive:
         self.status = None if scenario.goal.violations(scenario.start) else REACHED
         self.cycles: list[Cycle] = []
         warm_up(needs_ompl=self.settings.planner not in COMPILED_PLANNERS)
-        if not is_free(self._committed.states, self._dt, clearance_map_for(scenario.world, self._robot.footprint)):
+        if not is_free(self._committed.states, self._dt, clearance_map_for(self.world, self._robot.footprint)):
             expected = f"a state with {self.settings.margin:g} m of room (the margin), on the way to rest as well"
             raise ScenarioError(Problem("start", list(scenario.start), expected))
 
@@ -122,7 +123,8 @@ class Drive:
             braking=_joined([*self._driven, self._committed], self._dt),
             cycles=tuple(self.cycles),
             scenario=self.scenario,
-            known=self._known,
+            hidden=self.hidden,
+            world=self.world,
             settings=self.settings,
         )
 
@@ -145,7 +147,7 @@ class Drive:
             self._committed = _part(self._committed, at_goal, None, self._dt)
             self.status = REACHED
         else:
-            is_ready = self._continue_plan(bool(seen))
+            is_ready = not is_over and self._continue_plan(bool(seen))
             if not is_ready and not is_over:
                 replan = self._replan(State(*piece.states[-1].tolist()), looked_at, portions, began)
                 is_ready = replan.trajectory is not None
