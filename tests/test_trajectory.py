@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import math
 import os
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,8 +17,12 @@ from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
 from cbrrt_ompl.errors import InputError, TrajectoryError
+from cbrrt_ompl.planning import plan
+from cbrrt_ompl.robot import Limits
+from cbrrt_ompl.scenario import load_scenario
 from cbrrt_ompl.trajectory import COLUMNS, Trajectory, displacement, wrapped
 from cbrrt_ompl.tree import Tree
+from cbrrt_ompl.verification import verify
 
 SUFFIXES = (".csv", ".npz", ".json")
 
@@ -445,3 +450,102 @@ def test_arrays_that_are_no_tree_are_refused_by_name(
 ) -> None:
     with pytest.raises(InputError, match=message):
         Tree(states, np.array(parents), polyline)
+
+
+velocities = st.tuples(st.floats(-1.0, 2.0), st.floats(-2.0, 2.0))
+braking_limits = st.builds(
+    Limits,
+    v_min=st.just(-1.0),
+    v_max=st.just(2.0),
+    omega_min=st.just(-2.0),
+    omega_max=st.just(2.0),
+    acceleration=st.floats(0.1, 5.0),
+    angular_acceleration=st.floats(0.1, 10.0),
+)
+
+
+@given(velocities, braking_limits, st.floats(0.01, 0.2))
+def test_braking_is_as_hard_as_the_limits_allow_and_ends_at_rest(
+    velocity: tuple[float, float], limits: Limits, step: float
+) -> None:
+    row = [np.array([value]) for value in (3.0, 1.0, -2.0, 0.5, *velocity, *velocity)]
+    stop = Trajectory(*row).stopping_at(3.0, limits, step)
+    np.testing.assert_array_equal(stop.states[-1, 3:], 0.0)
+    np.testing.assert_allclose(np.diff(stop.t), step)
+    for speed, rate in ((np.abs(stop.v), limits.acceleration), (np.abs(stop.omega), limits.angular_acceleration)):
+        np.testing.assert_allclose(speed, np.maximum(speed[0] - rate * step * np.arange(len(stop)), 0.0), atol=1e-9)
+    if len(stop) > 1:
+        np.testing.assert_array_equal([stop.v_command, stop.omega_command], 0.0)
+        slowest = max(abs(velocity[0]) / limits.acceleration, abs(velocity[1]) / limits.angular_acceleration)
+        assert stop.duration < slowest + step * (1.0 + 1e-9)
+
+
+@given(velocities, braking_limits)
+def test_braking_moves_as_its_velocities_say(velocity: tuple[float, float], limits: Limits) -> None:
+    row = [np.array([value]) for value in (0.0, 1.0, -2.0, 0.5, *velocity, *velocity)]
+    stop = Trajectory(*row).stopping_at(0.0, limits, 0.05)
+    moved = displacement(stop.theta[:-1], stop.v[:-1], stop.v[1:], stop.omega[:-1], stop.omega[1:], np.diff(stop.t))
+    np.testing.assert_allclose(np.diff(stop.x), moved[:, 0], atol=1e-6)
+    np.testing.assert_allclose(np.diff(stop.y), moved[:, 1], atol=1e-6)
+    np.testing.assert_allclose(wrapped(np.diff(stop.theta) - moved[:, 2]), 0.0, atol=1e-12)
+
+
+def test_a_plan_is_driven_up_to_the_row_where_braking_begins(scenarios: Path) -> None:
+    scenario = load_scenario(scenarios / "paper_case1.yaml")
+    found = plan(scenario, "cb-rrt-compiled", seed=1).trajectory
+    assert found is not None
+    assert found.limits == scenario.robot.limits
+    for t in (0.0, 2.0, 2.01, found.t[-1]):
+        row = int(np.searchsorted(found.t, t))
+        stop = found.stopping_at(t)
+        for name in ("t", "x", "y", "theta", "v", "omega"):
+            np.testing.assert_array_equal(getattr(stop, name)[: row + 1], getattr(found, name)[: row + 1])
+        np.testing.assert_array_equal(stop.v_command[:row], found.v_command[:row])
+        np.testing.assert_array_equal(stop.states[-1, 3:], 0.0)
+        assert {violation.kind for violation in verify(stop, scenario).violations} <= {"goal", "collision"}
+
+
+def test_a_trajectory_at_rest_is_not_braked() -> None:
+    stop = profile([0.0, 1.0, 2.0], [1.0, 0.5, 0.0], [0.0, 0.0, 0.0]).stopping_at(2.0)
+    assert stop == profile([0.0, 1.0, 2.0], [1.0, 0.5, 0.0], [0.0, 0.0, 0.0]).stopping_at(1.5)
+    assert (len(stop), stop.v_command.tolist()) == (3, [1.0, 0.5, 0.5])
+
+
+def test_a_kinematic_trajectory_stops_at_once() -> None:
+    stop = arc(kinematic=True).stopping_at(0.5)
+    assert (len(stop), stop.kinematic, stop.t[-1]) == (7, True, pytest.approx(0.6))
+    np.testing.assert_array_equal(stop.states[-1], [*stop.poses[-2], 0.0, 0.0])
+    np.testing.assert_array_equal(stop.step_velocities[:, -1], 0.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"t": -0.1}, r"t: got -0\.1, expected a time from 0 to 2 s"),
+        ({"t": math.nan}, "t: got nan"),
+        ({"t": 1.0, "limits": None}, "limits: missing, expected the limits of the robot"),
+        ({"t": 1.0, "limits": Limits(acceleration=-1.0)}, "limits.acceleration: got -1.0"),
+        ({"t": 1.0, "step": 0.0}, r"step: got 0\.0, expected an integration step above 0"),
+        ({"t": 1.0, "step": 1e-9}, "step: got 1e-09, expected a step in which 100000 of them bring the robot to rest"),
+    ],
+)
+def test_braking_that_makes_no_sense_is_refused(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(TrajectoryError, match=f"^{message}"):
+        arc().stopping_at(**{"limits": Limits(), **arguments})
+
+
+def test_a_single_row_is_braked_with_a_step_alone() -> None:
+    row = Trajectory(*(np.array([value]) for value in (0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0)))
+    with pytest.raises(TrajectoryError, match="^step: missing, expected an integration step"):
+        row.stopping_at(0.0, Limits())
+    assert row.stopping_at(0.0, Limits(), 0.1).duration == pytest.approx(1.7)
+
+
+def test_limits_are_no_part_of_equality_nor_of_files(tmp_path: Path) -> None:
+    limited = replace(arc(), limits=Limits())
+    assert limited == arc()
+    for suffix in SUFFIXES:
+        limited.save(tmp_path / f"a{suffix}")
+        arc().save(tmp_path / f"b{suffix}")
+        assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
+        assert Trajectory.load(tmp_path / f"a{suffix}").limits is None
