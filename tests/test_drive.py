@@ -1,4 +1,4 @@
-"""Drives through half-known worlds: what is seen, when it is planned again, and that the robot never touches anything."""
+"""Drives through half-known worlds: what is seen, when the robot plans again, and that it never touches anything."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ from cbrrt_ompl.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.trajectory import Trajectory
 from cbrrt_ompl.world import World
 
+START = State(0.8, 2.0)
 HALL = Bounds((0.0, 0.0), (8.0, 4.0))
 ROUND = Robot(Footprint.disc(0.2), Limits(0.0, 1.0, -1.0, 1.0, 0.6, 2.0))
 OBLONG = Robot(Footprint.polygon([[-0.3, -0.2], [0.3, -0.2], [0.3, 0.2], [-0.3, 0.2]]), ROUND.limits)
@@ -35,7 +36,7 @@ WALL_WITH_GAP = (Box((4.0, 0.0), (4.2, 1.6)), Box((4.0, 2.4), (4.2, 4.0)))
 PLUG = Box((3.9, 1.5), (4.3, 2.5))
 
 
-def hall(*obstacles: Obstacle, robot: Robot = ROUND, start: State = State(0.8, 2.0), **changes: object) -> Scenario:
+def hall(*obstacles: Obstacle, robot: Robot = ROUND, start: State = START, **changes: object) -> Scenario:
     """A hall of 8 m x 4 m, to be driven through from left to right."""
     parts = {
         "name": "hall",
