@@ -76,6 +76,7 @@ def main() -> None:
     """Print one table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--worlds", type=int, default=200)
+    parser.add_argument("--first", type=int, default=0, help="number of the first world")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--sensor-range", type=float, default=2.5, help="[m]")
     parser.add_argument("--cycle", type=float, default=0.1, help="[s]")
@@ -85,7 +86,7 @@ def main() -> None:
     settings = DriveSettings(arguments.sensor_range, arguments.cycle, max_samples=arguments.max_samples)
     began, results, possible = time.perf_counter(), [], 0
     collisions, invalid, moving = [], [], []
-    for world in range(arguments.worlds):
+    for world in range(arguments.first, arguments.first + arguments.worlds):
         scenario, hidden = random_world(np.random.default_rng([arguments.seed, world]))
         if arguments.all_hidden:
             hidden = [*scenario.world.obstacles, *hidden]
