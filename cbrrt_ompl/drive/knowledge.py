@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from itertools import compress
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cbrrt_ompl.clearance_map import ClearanceMap, clearance_map_for, extend_map
 from cbrrt_ompl.obstacles import Obstacle, bounding_box, signed_distance
@@ -34,7 +35,8 @@ class Knowledge:
         self.world = world
         self.hidden = list(hidden)
         self._footprint = footprint
-        self._boxes = np.array([bounding_box(obstacle) for obstacle in hidden]).reshape(-1, 4)
+        boxes = [bounding_box(obstacle) for obstacle in hidden]
+        self._boxes: NDArray[np.float64] = np.array(boxes, dtype=np.float64).reshape(-1, 4)
 
     @property
     def clearance_map(self) -> ClearanceMap:
