@@ -301,7 +301,7 @@ def draw_extension(
     ax.set_ylabel("y [m]")
     ax.grid(True, linewidth=0.4, color="0.88")
     ax.set_axisbelow(True)
-    _legend_above(ax)
+    legend_above(ax)
     return ax
 
 

@@ -454,13 +454,9 @@ def test_arrays_that_are_no_tree_are_refused_by_name(
 
 velocities = st.tuples(st.floats(-1.0, 2.0), st.floats(-2.0, 2.0))
 braking_limits = st.builds(
-    Limits,
-    v_min=st.just(-1.0),
-    v_max=st.just(2.0),
-    omega_min=st.just(-2.0),
-    omega_max=st.just(2.0),
-    acceleration=st.floats(0.1, 5.0),
-    angular_acceleration=st.floats(0.1, 10.0),
+    lambda a, alpha: Limits(-1.0, 2.0, -2.0, 2.0, acceleration=a, angular_acceleration=alpha),
+    st.floats(0.1, 5.0),
+    st.floats(0.1, 10.0),
 )
 
 
@@ -488,6 +484,18 @@ def test_braking_moves_as_its_velocities_say(velocity: tuple[float, float], limi
     np.testing.assert_allclose(np.diff(stop.x), moved[:, 0], atol=1e-6)
     np.testing.assert_allclose(np.diff(stop.y), moved[:, 1], atol=1e-6)
     np.testing.assert_allclose(wrapped(np.diff(stop.theta) - moved[:, 2]), 0.0, atol=1e-12)
+
+
+@given(velocities)
+def test_braking_obeys_the_limits_of_the_wheels(velocity: tuple[float, float]) -> None:
+    limits = Limits(
+        -1.0, 2.0, -2.0, 2.0, 1.0, 3.0, wheel_separation=0.4, wheel_speed=3.0, wheel_acceleration=0.8
+    )  # fmt: skip
+    row = [np.array([value]) for value in (0.0, 1.0, -2.0, 0.5, *velocity, *velocity)]
+    stop = Trajectory(*row).stopping_at(0.0, limits, 0.05)
+    np.testing.assert_array_equal(stop.states[-1, 3:], 0.0)
+    for side in (-0.2, 0.2):
+        assert (np.abs(np.diff(stop.v + side * stop.omega)) <= 0.8 * 0.05 + 1e-9).all()
 
 
 def test_a_plan_is_driven_up_to_the_row_where_braking_begins(scenarios: Path) -> None:
