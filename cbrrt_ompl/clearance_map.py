@@ -275,9 +275,9 @@ class ClearanceMap:
             other: a map of the same bounds and footprint.
             added: the obstacles that its world has not.
         """
-        self._cells, self.children = other._cells, other.children.copy()
+        self._rows, self.children = other._rows, other.children.copy()
         self.clearances = other.clearances.copy()
-        leaves = np.flatnonzero(self.children[: self._cells] == 0)
+        leaves = self._root + np.flatnonzero(self.children[self._root : self._rows] == 0)
         for obstacle in added:
             x, y, clearance = self.clearances[leaves].T
             x_min, y_min, x_max, y_max = bounding_box(obstacle)
