@@ -10,6 +10,7 @@ is split where the question was.
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Sequence
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
@@ -22,7 +23,7 @@ from cbrrt_ompl.disc_tree import disc_tree
 from cbrrt_ompl.kinematics import sine_cosine
 from cbrrt_ompl.obstacles import Obstacle, bounding_box, signed_distance
 from cbrrt_ompl.robot import Footprint
-from cbrrt_ompl.world import CONTACT_TOLERANCE, MITRE_LIMIT, World
+from cbrrt_ompl.world import CONTACT_TOLERANCE, MITRE_LIMIT, CollisionChecker, World
 
 COLLISION = -1.0
 """Certificate of a position at which the footprint touches something, whatever its heading."""
@@ -221,7 +222,8 @@ def certify_parts(view: MapView, x: float, y: float, theta: float, room: float) 
 class ClearanceMap:
     """Decides states for one footprint in one world: by certificate where possible, else by FCL.
 
-    The map grows where it is asked, never beyond `MAX_CELLS`; its answers are FCL's whatever it holds.
+    The map grows where it is asked, never beyond `MAX_CELLS`; its answers are FCL's whatever it holds. It serves one
+    thread at a time, and shares no FCL object that is moved with any other map.
 
     Attributes:
         checker: the FCL queries behind the map.
@@ -240,11 +242,11 @@ class ClearanceMap:
             footprint: the robot's area.
             enabled: False leaves the map empty, so that FCL decides every state inside the bounds.
         """
-        self.checker = world.checker(footprint)
+        self.checker = CollisionChecker(world, footprint)
         self.enabled = enabled
         self._is_round = footprint.is_round
         self.exact_queries = 0
-        self._signed_clearance = world.checker(Footprint.point()).signed_clearance
+        self._signed_clearance = CollisionChecker(world, Footprint.point()).signed_clearance
         bounds = world.bounds
         size = max(bounds.size)
         self._smallest = 2.0 * SMALLEST_CELL
@@ -409,12 +411,22 @@ class ClearanceMap:
         self.children[cell] = first  # last, so that no reader ever meets a child without its clearance
 
 
-_maps: WeakKeyDictionary[World, dict[Footprint, ClearanceMap]] = WeakKeyDictionary()
+class _Maps(threading.local):
+    """The maps of a thread."""
+
+    def __init__(self) -> None:
+        self.of_worlds: WeakKeyDictionary[World, dict[Footprint, ClearanceMap]] = WeakKeyDictionary()
+
+
+_maps = _Maps()
 
 
 def clearance_map_for(world: World, footprint: Footprint) -> ClearanceMap:
-    """The map of a footprint in a world: made once, grown by every plan, and kept as long as the world."""
-    maps = _maps.setdefault(world, {})
+    """The calling thread's map of a footprint in a world.
+
+    It is made once, grown by every plan of the thread, and kept as long as the world and the thread.
+    """
+    maps = _maps.of_worlds.setdefault(world, {})
     if footprint not in maps:
         maps[footprint] = ClearanceMap(world, footprint)
     return maps[footprint]

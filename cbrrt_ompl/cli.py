@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
 from cbrrt_ompl.errors import CbrrtError, InputError, Problem
+from cbrrt_ompl.files import save_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from cbrrt_ompl.demo import DemoRun
     from cbrrt_ompl.drive import DriveResult
     from cbrrt_ompl.planning import PlanResult
+    from cbrrt_ompl.trajectory import Trajectory
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED, BROKEN_PIPE = 0, 1, 2, 130, 141
 TRAJECTORY_SUFFIXES = (".csv", ".npz", ".json")
@@ -166,6 +168,7 @@ def _add_show(commands: Any) -> None:
     parser = _add_command(commands, "show", _show, "draw a scenario, and a trajectory in it", example)
     parser.add_argument("scenario", type=Path, metavar="SCENARIO", help=SCENARIO_HELP)
     parser.add_argument("--trajectory", type=Path, metavar="FILE", help="draw this trajectory too")
+    parser.add_argument("--kinematic", action="store_true", help="let its velocities jump, as those of s-rrt do")
     parser.add_argument("--figure", type=Path, metavar="FILE", help="write .png, .pdf or .svg instead of a window")
 
 
@@ -266,7 +269,7 @@ def _plan(arguments: argparse.Namespace) -> int:
     if arguments.figure is not None:
         from cbrrt_ompl.figures import draw_plan
 
-        draw_plan(result, scenario).savefig(arguments.figure)
+        save_figure(draw_plan(result, scenario), arguments.figure)
     if arguments.animation is not None and result.trajectory is not None:
         from cbrrt_ompl.animation import animate, save_animation
 
@@ -306,7 +309,7 @@ def _drive(arguments: argparse.Namespace) -> int:
     if arguments.figure is not None:
         from cbrrt_ompl.figures import draw_drive
 
-        draw_drive(result).savefig(arguments.figure)
+        save_figure(draw_drive(result), arguments.figure)
     if arguments.animation is not None:
         from cbrrt_ompl.animation import animate_drive, save_animation
 
@@ -337,12 +340,9 @@ def _warm_up(planner: str) -> None:
 def _verify(arguments: argparse.Namespace) -> int:
     """``cbrrt verify``."""
     from cbrrt_ompl.scenario import load_scenario
-    from cbrrt_ompl.trajectory import Trajectory
     from cbrrt_ompl.verification import verify
 
-    trajectory = Trajectory.load(arguments.trajectory)
-    if arguments.kinematic:
-        trajectory = replace(trajectory, kinematic=True)
+    trajectory = _load_trajectory(arguments)
     verification = verify(trajectory, load_scenario(arguments.scenario))
     if arguments.json:
         _print_json({"ok": verification.ok, **asdict(verification)})
@@ -355,27 +355,47 @@ def _verify(arguments: argparse.Namespace) -> int:
 def _show(arguments: argparse.Namespace) -> int:
     """``cbrrt show``."""
     _check_outputs(("--figure", arguments.figure, FIGURE_SUFFIXES))
+    _check_backend()
     from matplotlib.figure import Figure
 
     from cbrrt_ompl.figures import draw_scene, draw_trajectory
     from cbrrt_ompl.scenario import load_scenario
-    from cbrrt_ompl.trajectory import Trajectory
 
     scenario = load_scenario(arguments.scenario)
-    trajectory = None if arguments.trajectory is None else Trajectory.load(arguments.trajectory)
+    trajectory = None if arguments.trajectory is None else _load_trajectory(arguments)
     size: dict[str, Any] = {"figsize": (6.4, 6.4), "layout": "constrained", "dpi": 150}
     figure = Figure(**size) if arguments.figure is not None else _window(**size)
     ax = draw_scene(figure.subplots(), scenario)
     if trajectory is not None:
         draw_trajectory(ax, trajectory, scenario.robot.footprint)
-    ax.set_title(scenario.name)
+    ax.set_title(scenario.name, parse_math=False)
     if arguments.figure is not None:
-        figure.savefig(arguments.figure)
+        save_figure(figure, arguments.figure)
     else:
         from matplotlib import pyplot
 
         pyplot.show()
     return DONE
+
+
+def _load_trajectory(arguments: argparse.Namespace) -> Trajectory:
+    """The trajectory file of a command line, kinematic where the file or the user says so."""
+    from cbrrt_ompl.trajectory import Trajectory
+
+    trajectory = Trajectory.load(arguments.trajectory)
+    return replace(trajectory, kinematic=True) if arguments.kinematic else trajectory
+
+
+def _check_backend() -> None:
+    """Import matplotlib, which refuses a wrong MPLBACKEND.
+
+    Raises:
+        CbrrtError: if it does.
+    """
+    try:
+        import matplotlib  # noqa: F401  # the import is the check
+    except ValueError as error:
+        raise CbrrtError(f"MPLBACKEND: {error}") from None
 
 
 def _planners(arguments: argparse.Namespace) -> int:
@@ -423,6 +443,7 @@ def _bench(arguments: argparse.Namespace) -> int:
 
 def _report(arguments: argparse.Namespace) -> int:
     """``cbrrt report``."""
+    _check_backend()
     from cbrrt_ompl.benchmark.report import write_report
 
     report = write_report(arguments.database, arguments.output, arguments.reference)
@@ -456,6 +477,7 @@ def _reproduce(arguments: argparse.Namespace) -> int:
 
 def _demo(arguments: argparse.Namespace) -> int:
     """``cbrrt demo``."""
+    _check_backend()
     arguments.output.mkdir(parents=True, exist_ok=True)
     from cbrrt_ompl.demo import REPRODUCTION_RUNS, caveat, run_demo
     from cbrrt_ompl.reproduce.reproduction import reproduce
@@ -718,6 +740,8 @@ def _check_plan_outputs(arguments: argparse.Namespace) -> None:
         ("--figure", arguments.figure, FIGURE_SUFFIXES),
         ("--animation", arguments.animation, ANIMATION_SUFFIXES),
     )
+    if arguments.figure is not None or arguments.animation is not None:
+        _check_backend()
     if arguments.animation is not None:
         from cbrrt_ompl.animation import check_animation_file
 

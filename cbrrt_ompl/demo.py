@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from typing import TypeAlias
 from matplotlib.figure import Figure
 
 from cbrrt_ompl.figures import draw_plan, draw_velocities
+from cbrrt_ompl.files import save_figure, write_file
 from cbrrt_ompl.planning import PlanResult, plan
 from cbrrt_ompl.reproduce.published import PAPER, Published
 from cbrrt_ompl.scenario import Scenario, load_scenario, scenario_path
@@ -107,7 +107,7 @@ def run_demo(output: Path, seed: int | None, watch: Watch) -> Iterator[DemoRun]:
     for scene, planner in pairs:
         if scene not in scenarios:
             path = scenario_path(scene)
-            shutil.copyfile(path, output / path.name)
+            write_file(output / path.name, path.read_bytes())
             scenarios[scene] = load_scenario(path)
         plan(scenarios[scene], planner, seed, WARM_UP)
     runs = []
@@ -120,7 +120,7 @@ def run_demo(output: Path, seed: int | None, watch: Watch) -> Iterator[DemoRun]:
         _write(output / f"{scene}_{planner}", run)
         runs.append(run)
         yield run
-    (output / "results.md").write_text(markdown(runs, seed), encoding="utf-8")
+    write_file(output / "results.md", markdown(runs, seed))
 
 
 def markdown(runs: Sequence[DemoRun], seed: int | None) -> str:
@@ -140,7 +140,7 @@ def caveat(seed: int | None) -> str:
 
 def _write(stem: Path, run: DemoRun) -> None:
     """Write figures and trajectory of one run; ``stem`` is their path without suffix."""
-    draw_plan(run.result, run.scenario).savefig(stem.with_name(f"{stem.name}.png"))
+    save_figure(draw_plan(run.result, run.scenario), stem.with_name(f"{stem.name}.png"))
     trajectory = run.result.trajectory
     if trajectory is None:
         return
@@ -149,4 +149,4 @@ def _write(stem: Path, run: DemoRun) -> None:
         figure = Figure(figsize=(6.4, 4.0), layout="constrained", dpi=150)
         draw_velocities(figure.subplots(2, sharex=True), trajectory, run.scenario.robot.limits)
         figure.axes[0].legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, fontsize=8, frameon=False)
-        figure.savefig(stem.with_name(f"{stem.name}_velocities.png"))
+        save_figure(figure, stem.with_name(f"{stem.name}_velocities.png"))

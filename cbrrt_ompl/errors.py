@@ -41,6 +41,16 @@ class _Missing:
 MISSING = _Missing()
 
 
+class Remark(str):
+    """A remark in the place of a value: a message shows it without quotes."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        """The remark itself."""
+        return str(self)
+
+
 class InputError(CbrrtError, ValueError):
     """Input that cannot be used: a file, or the arguments of a call.
 
@@ -96,5 +106,8 @@ class UnknownPlannerError(InputError):
 
 def _short(value: object, limit: int = 60) -> str:
     """Text of a value that fits into one line."""
-    text = " ".join(repr(value).split())
+    try:
+        text = " ".join(repr(value).split())
+    except Exception:  # whole numbers of more than 4,300 digits, and whatever else a caller may hand over
+        text = f"a value of type {type(value).__name__}"
     return text if len(text) <= limit else text[: limit - 3] + "..."

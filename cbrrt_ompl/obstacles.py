@@ -12,9 +12,10 @@ import shapely
 from numpy.typing import NDArray
 
 from cbrrt_ompl.errors import Problem, WorldError
-from cbrrt_ompl.robot import counter_clockwise_ring
+from cbrrt_ompl.robot import LARGEST, counter_clockwise_ring
+from cbrrt_ompl.sections import is_number
 
-MAX_COORDINATE = 1e6
+MAX_COORDINATE = LARGEST
 """Largest coordinate of a world [m]: beyond it the contact tolerance would drown in rounding."""
 
 _COORDINATES = f"finite coordinates of at most {MAX_COORDINATE:g} m"
@@ -35,9 +36,7 @@ class Bounds:
 
     def __post_init__(self) -> None:
         """Check the corners."""
-        problems = _rectangle_problems("bounds", self.min, self.max)
-        if problems:
-            raise WorldError(problems)
+        _check_rectangle(self, "bounds")
 
     @property
     def size(self) -> tuple[float, float]:
@@ -75,9 +74,7 @@ class Box:
 
     def __post_init__(self) -> None:
         """Check the corners."""
-        problems = _rectangle_problems("box", self.min, self.max)
-        if problems:
-            raise WorldError(problems)
+        _check_rectangle(self, "box")
 
     def to_shapely(self) -> shapely.Polygon:
         """The same area as a shapely polygon."""
@@ -102,14 +99,18 @@ class OrientedBox:
     def __post_init__(self) -> None:
         """Check centre, sides and angle."""
         problems = []
-        if not all(_is_coordinate(c) for c in self.center):
+        center, size = _pair(self.center), _pair(self.size)
+        if center is None:
             problems.append(Problem("oriented_box.center", self.center, _COORDINATES))
-        if not all(0.0 < side <= MAX_COORDINATE for side in self.size):
+        if size is None or not min(size) > 0.0:
             problems.append(Problem("oriented_box.size", self.size, "two sides above 0 [m]"))
-        if not math.isfinite(self.angle):
+        if not is_number(self.angle, LARGEST):
             problems.append(Problem("oriented_box.angle", self.angle, "a finite angle [rad]"))
         if problems:
             raise WorldError(problems)
+        object.__setattr__(self, "center", center)
+        object.__setattr__(self, "size", size)
+        object.__setattr__(self, "angle", float(self.angle))
 
     @property
     def vertices(self) -> NDArray[np.float64]:
@@ -144,12 +145,15 @@ class Disc:
     def __post_init__(self) -> None:
         """Check centre and radius."""
         problems = []
-        if not all(_is_coordinate(c) for c in self.center):
+        center = _pair(self.center)
+        if center is None:
             problems.append(Problem("disc.center", self.center, _COORDINATES))
-        if not (0.0 < self.radius <= MAX_COORDINATE):
+        if not (is_number(self.radius, MAX_COORDINATE) and self.radius > 0.0):
             problems.append(Problem("disc.radius", self.radius, "a radius above 0 [m]"))
         if problems:
             raise WorldError(problems)
+        object.__setattr__(self, "center", center)
+        object.__setattr__(self, "radius", float(self.radius))
 
     def to_shapely(self) -> shapely.Polygon:
         """The disc as a shapely polygon of 256 sides."""
@@ -172,10 +176,10 @@ class Polygon:
     def __post_init__(self) -> None:
         """Check and freeze the rings."""
         object.__setattr__(self, "vertices", counter_clockwise_ring(self.vertices, "polygon.vertices"))
+        if not isinstance(self.holes, list | tuple):
+            raise WorldError(Problem("polygon.holes", self.holes, "a list of rings"))
         holes = tuple(counter_clockwise_ring(h, f"polygon.holes[{i}]") for i, h in enumerate(self.holes))
         object.__setattr__(self, "holes", holes)
-        if float(np.abs(self.vertices).max()) > MAX_COORDINATE:
-            raise WorldError(Problem("polygon.vertices", self.vertices.tolist(), _COORDINATES))
         shape = self.to_shapely()
         if not shape.is_valid:
             reason = shapely.is_valid_reason(shape).lower()
@@ -266,14 +270,25 @@ def _ring(ring: shapely.LinearRing) -> NDArray[np.float64]:
     return shapely.get_coordinates(ring)  # (n, 2)
 
 
-def _is_coordinate(value: float) -> bool:
-    return abs(value) <= MAX_COORDINATE  # False for NaN
+def _pair(values: object) -> tuple[float, float] | None:
+    """Two numbers of at most `MAX_COORDINATE`; None where they are none."""
+    if isinstance(values, Sequence | np.ndarray) and len(values) == 2:
+        x, y = values
+        if is_number(x, MAX_COORDINATE) and is_number(y, MAX_COORDINATE):
+            return float(x), float(y)
+    return None
 
 
-def _rectangle_problems(name: str, low: Sequence[float], high: Sequence[float]) -> list[Problem]:
-    """What is wrong with the rectangle from low to high."""
-    if not all(_is_coordinate(c) for c in (*low, *high)):
-        return [Problem(name, [list(low), list(high)], _COORDINATES)]
+def _check_rectangle(rectangle: Bounds | Box, name: str) -> None:
+    """Check the corners of a rectangle, and keep them as floats.
+
+    Raises:
+        WorldError: if a corner is not finite or the rectangle has no area.
+    """
+    low, high = _pair(rectangle.min), _pair(rectangle.max)
+    if low is None or high is None:
+        raise WorldError(Problem(name, [rectangle.min, rectangle.max], _COORDINATES))
     if not (low[0] < high[0] and low[1] < high[1]):
-        return [Problem(name, [list(low), list(high)], "min below max in x and in y")]
-    return []
+        raise WorldError(Problem(name, [list(low), list(high)], "min below max in x and in y"))
+    object.__setattr__(rectangle, "min", low)
+    object.__setattr__(rectangle, "max", high)

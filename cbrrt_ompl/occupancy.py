@@ -9,15 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from cbrrt_ompl.errors import MapError, Problem
+from cbrrt_ompl.errors import MapError, Problem, Remark
 from cbrrt_ompl.obstacles import MAX_COORDINATE, Bounds, Box, Obstacle, OrientedBox, Polygon
-from cbrrt_ompl.plain_yaml import Remark
+from cbrrt_ompl.sections import is_number
 
 UNKNOWN, FREE, OCCUPIED = -1, 0, 100
 """What a cell may be, in the numbers of ROS."""
@@ -61,7 +60,10 @@ def cells_from(
     Raises:
         MapError: if these are no such values.
     """
-    values = np.asarray(grid)
+    try:
+        values = np.asarray(grid)
+    except ValueError:  # rows of different lengths
+        raise MapError(Problem("grid", grid, "cells in rows and columns")) from None
     check_thresholds(occupied_thresh, free_thresh)
     if values.ndim != 2 or values.size == 0:
         raise MapError(Problem("grid", Remark(f"the shape {values.shape}"), "cells in rows and columns"))
@@ -93,7 +95,7 @@ def blocked_cells(cells: NDArray[np.int8], unknown: str) -> NDArray[np.bool_]:
     Raises:
         MapError: if ``unknown`` is another word, or no cell is left to be in.
     """
-    if unknown not in UNKNOWN_CELLS:
+    if not (isinstance(unknown, str) and unknown in UNKNOWN_CELLS):
         raise MapError(Problem("unknown", unknown, f"one of {', '.join(UNKNOWN_CELLS)}"))
     blocked = cells != FREE if unknown == "occupied" else cells == OCCUPIED
     if blocked.all():
@@ -179,10 +181,10 @@ def check_frame(shape: tuple[int, ...], resolution: float, origin: Sequence[floa
         MapError: with what is wrong with the resolution and the origin.
     """
     problems = []
-    if not _is_number(resolution) or not 0.0 < resolution <= MAX_COORDINATE:
+    if not (is_number(resolution, MAX_COORDINATE) and resolution > 0.0):
         problems.append(Problem("resolution", resolution, "the side of a cell, a number above 0 [m]"))
     values = list(origin) if isinstance(origin, Sequence | np.ndarray) and not isinstance(origin, str) else []
-    if len(values) != 3 or not all(_is_number(value) for value in values):
+    if len(values) != 3 or not all(is_number(value, MAX_COORDINATE) for value in values):
         problems.append(Problem("origin", origin, "three finite numbers [x, y, yaw] [m, m, rad]"))
     if not problems and np.abs(grid_corners(shape, resolution, values)).max() > MAX_COORDINATE:
         found = Remark(f"{shape[1]} x {shape[0]} cells of {resolution:g} m at {values[:2]}")
@@ -197,7 +199,7 @@ def check_thresholds(occupied_thresh: float, free_thresh: float) -> None:
     Raises:
         MapError: if they are no likelihoods or out of order.
     """
-    if not (_is_number(occupied_thresh) and _is_number(free_thresh) and 0.0 <= free_thresh <= occupied_thresh <= 1.0):
+    if not (is_number(occupied_thresh) and is_number(free_thresh) and 0.0 <= free_thresh <= occupied_thresh <= 1.0):
         found = {"free_thresh": free_thresh, "occupied_thresh": occupied_thresh}
         raise MapError(Problem("thresholds", found, "0 <= free_thresh <= occupied_thresh <= 1"))
 
@@ -210,12 +212,6 @@ def check_cell_count(shape: tuple[int, ...], field: str) -> None:
     """
     if shape[0] * shape[1] > MAX_CELLS:
         raise MapError(Problem(field, Remark(f"{shape[1]} x {shape[0]} cells"), f"at most {MAX_CELLS} cells"))
-
-
-def _is_number(value: Any) -> bool:
-    """Whether a value is a finite number and no truth value."""
-    is_real = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
-    return is_real and bool(abs(value) < math.inf)
 
 
 def _quarter_turns(yaw: float) -> int | None:

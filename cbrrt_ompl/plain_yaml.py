@@ -15,7 +15,7 @@ from typing import Any
 
 import yaml
 
-from cbrrt_ompl.errors import InputError, Problem
+from cbrrt_ompl.errors import InputError, Problem, Remark
 
 MAX_FILE_SIZE = 16 * 2**20
 """Largest file that is read [bytes]."""
@@ -34,16 +34,6 @@ _WORDS = {
     **dict.fromkeys(("false", "False", "FALSE"), False),
     **dict.fromkeys((".nan", ".NaN", ".NAN"), math.nan),
 }
-
-
-class Remark(str):
-    """A remark in the place of a value: a message shows it without quotes."""
-
-    __slots__ = ()
-
-    def __repr__(self) -> str:
-        """The remark itself."""
-        return str(self)
 
 
 def read_yaml(path: Path, problems: list[Problem]) -> object:

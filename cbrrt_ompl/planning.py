@@ -6,7 +6,9 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
+from numbers import Integral
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +17,8 @@ from cbrrt_ompl.compiled.search import ROBUST, Search
 from cbrrt_ompl.errors import Problem, SettingsError, UnknownPlannerError
 from cbrrt_ompl.extension import COMPILED_PLANNERS, check_step, law_of, pack_model
 from cbrrt_ompl.replay import trajectory_from_controls
-from cbrrt_ompl.scenario import Scenario
+from cbrrt_ompl.scenario import Scenario, check_scenario
+from cbrrt_ompl.sections import is_number
 from cbrrt_ompl.trajectory import Trajectory
 from cbrrt_ompl.tree import Tree
 from cbrrt_ompl.warm_up import warm_up
@@ -77,6 +80,10 @@ class PlanResult:
         """All nodes and edges; made when first asked for."""
         return self.make_tree()
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What is pickled: the tree itself instead of the planner's memory."""
+        return {**self.__dict__, "make_tree": partial(_given, self.tree)}
+
 
 def plan(
     scenario: Scenario,
@@ -98,13 +105,15 @@ def plan(
         The result; "not solved" is a status of it and no error.
 
     Raises:
+        ScenarioError: if this is no scenario.
         UnknownPlannerError: if there is no such planner.
         SettingsError: if the seed, the time limit or the step make no sense.
         KeyboardInterrupt: on Ctrl-C, at once.
     """
-    if planner not in PLANNERS:
+    check_scenario(scenario)
+    if not (isinstance(planner, str) and planner in PLANNERS):
         raise UnknownPlannerError(planner, list(PLANNERS))
-    _check_arguments(seed, time_limit)
+    _check_arguments(seed, time_limit, progress)
     check_step(scenario.robot, scenario.planning)
     warm_up(needs_ompl=planner not in COMPILED_PLANNERS)
     watch = _Watch(time_limit, progress)
@@ -115,13 +124,16 @@ def plan(
     return _plan_in_ompl(scenario, planner, seed, watch)
 
 
-def _check_arguments(seed: int | None, time_limit: float) -> None:
+def _check_arguments(seed: object, time_limit: object, progress: object) -> None:
     """Refuse what no plan can start with."""
     problems = []
-    if seed is not None and not (isinstance(seed, (int, np.integer)) and 0 <= seed < 2**32 - 1):
+    if seed is not None and not (is_number(seed) and isinstance(seed, Integral) and 0 <= seed < 2**32 - 1):
         problems.append(Problem("seed", seed, f"a whole number from 0 to {2**32 - 2}"))
-    if not (isinstance(time_limit, (int, float)) and not math.isnan(time_limit) and time_limit > 0.0):
+    is_infinite = isinstance(time_limit, float) and time_limit == math.inf
+    if not (is_infinite or (is_number(time_limit) and time_limit > 0.0)):
         problems.append(Problem("time_limit", time_limit, "a number above 0 [s]"))
+    if progress is not None and not callable(progress):
+        problems.append(Problem("progress", progress, "something to call, or None"))
     if problems:
         raise SettingsError(problems)
 
@@ -177,6 +189,10 @@ def _already_there(scenario: Scenario, planner: str, seed: int | None) -> PlanRe
     stay = trajectory_from_controls(start[0], np.empty((0, 3)), np.empty(0, dtype=np.int64), model)
     tree = Tree(start, np.array([-1]), np.empty((0, 2)))
     return PlanResult(planner, seed, SOLVED, stay, 1, 0, 0.0, lambda: tree)
+
+
+def _given(tree: Tree) -> Tree:
+    return tree
 
 
 class _Watch:

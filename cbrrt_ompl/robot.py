@@ -11,6 +11,17 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from cbrrt_ompl.errors import Problem, RobotError, WorldError
+from cbrrt_ompl.sections import is_number
+
+LARGEST = 1e6
+"""Largest coordinate, limit, gain or setting, in SI units: beyond it, what we compute would drown in rounding."""
+
+A_NUMBER = f"a finite number, at most {LARGEST:g}"
+A_POSITIVE_NUMBER = f"a number above 0, at most {LARGEST:g}"
+
+
+_UNLIMITED = ("wheel_speed", "wheel_acceleration")
+"""Limits that may be infinite."""
 
 
 class Limits(NamedTuple):
@@ -46,9 +57,9 @@ class Limits(NamedTuple):
     def problems(self) -> list[Problem]:
         """What is wrong with these limits, one entry a mistake."""
         found = [
-            Problem(f"limits.{name}", value, "a finite number")
+            Problem(f"limits.{name}", value, A_NUMBER)
             for name, value in zip(self._fields, self, strict=True)
-            if not (math.isfinite(value) or (value == math.inf and name in ("wheel_speed", "wheel_acceleration")))
+            if not (is_number(value, LARGEST) or (name in _UNLIMITED and isinstance(value, float) and value == math.inf))
         ]
         if found:
             return found
@@ -77,9 +88,9 @@ class Gains(NamedTuple):
     def problems(self) -> list[Problem]:
         """What is wrong with these gains, one entry a mistake."""
         return [
-            Problem(f"gains.{name}", value, "a finite number, 0 or more")
+            Problem(f"gains.{name}", value, f"a finite number, 0 or more and at most {LARGEST:g}")
             for name, value in zip(self._fields, self, strict=True)
-            if not (math.isfinite(value) and value >= 0.0)
+            if not (is_number(value, LARGEST) and value >= 0.0)
         ]
 
 
@@ -122,19 +133,14 @@ class Footprint:
         Raises:
             RobotError: if the corners do not make a simple polygon with an area.
         """
-        return cls(vertices=np.asarray(vertices, dtype=float))
+        return cls(vertices=_ring(vertices))
 
     def __post_init__(self) -> None:
         """Check the shape, turn it counter-clockwise and freeze it."""
-        if not (math.isfinite(self.radius) and self.radius >= 0.0):
+        if not (is_number(self.radius, LARGEST) and self.radius >= 0.0):
             raise RobotError(Problem("footprint.radius", self.radius, "a radius of 0 or more [m]"))
-        if self.vertices is None:
-            return
-        try:
-            corners = counter_clockwise_ring(self.vertices, "footprint.vertices")
-        except WorldError as error:
-            raise RobotError(error.problems) from None
-        object.__setattr__(self, "vertices", corners)
+        if self.vertices is not None:
+            object.__setattr__(self, "vertices", _ring(self.vertices))
 
     def __eq__(self, other: object) -> bool:
         """Equal where the shapes are equal number for number."""
@@ -208,9 +214,25 @@ class Robot:
 
     def __post_init__(self) -> None:
         """Check limits and gains together."""
+        parts = (("footprint", Footprint), ("limits", Limits), ("gains", Gains))
+        wrong = [
+            Problem(f"robot.{name}", getattr(self, name), f"a value of type {kind.__name__}")
+            for name, kind in parts
+            if not isinstance(getattr(self, name), kind)
+        ]
+        if wrong:
+            raise RobotError(wrong)
         problems = self.limits.problems() + self.gains.problems()
         if problems:
             raise RobotError([Problem(f"robot.{p.field}", p.value, p.expected) for p in problems])
+
+
+def _ring(vertices: ArrayLike) -> NDArray[np.float64]:
+    """Corners of a footprint, checked and ordered."""
+    try:
+        return counter_clockwise_ring(vertices, "footprint.vertices")
+    except WorldError as error:
+        raise RobotError(error.problems) from None
 
 
 def counter_clockwise_ring(vertices: ArrayLike, field: str) -> NDArray[np.float64]:
@@ -227,11 +249,13 @@ def counter_clockwise_ring(vertices: ArrayLike, field: str) -> NDArray[np.float6
         WorldError: if they are not finite, fewer than three, or make no simple polygon with an area.
     """
     try:
-        corners = np.array(vertices, dtype=float)
-    except (TypeError, ValueError):
-        corners = np.empty(0)
-    if corners.ndim != 2 or corners.shape[1] != 2 or not np.isfinite(corners).all():
-        raise WorldError(Problem(field, vertices, "a list of [x, y] corners with finite numbers"))
+        numbers = np.array(vertices)
+    except ValueError:
+        numbers = np.empty(0)
+    is_list = numbers.ndim == 2 and numbers.shape[1] == 2 and numbers.dtype.kind in "fiu"
+    if not (is_list and (np.abs(numbers) <= LARGEST).all()):  # NaN is not
+        raise WorldError(Problem(field, vertices, f"a list of [x, y] corners with finite numbers, at most {LARGEST:g}"))
+    corners = numbers.astype(np.float64)
     if len(corners) > 1 and np.array_equal(corners[0], corners[-1]):
         corners = corners[:-1]
     if len(corners) < 3:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import math
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 from cbrrt_ompl.errors import MISSING, InputError, Problem, ScenarioError
-from cbrrt_ompl.robot import Limits, Robot
+from cbrrt_ompl.files import as_path, write_file
+from cbrrt_ompl.robot import A_NUMBER, LARGEST, Limits, Robot
 from cbrrt_ompl.scenario_file import MapSource, read_parts, scenario_data
-from cbrrt_ompl.sections import Report
+from cbrrt_ompl.sections import Report, is_number
 from cbrrt_ompl.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.world import World
 
@@ -44,6 +45,7 @@ class Scenario:
 
     def __post_init__(self) -> None:
         """Check that the parts fit each other."""
+        _check_types(self)
         problems = find_problems({field.name: getattr(self, field.name) for field in fields(self)})
         if problems:
             raise ScenarioError(problems)
@@ -63,6 +65,16 @@ class Scenario:
         return self.name, world, self.robot, self.start, self.goal, self.planning, self.map
 
 
+def check_scenario(value: object) -> None:
+    """Refuse what is no scenario.
+
+    Raises:
+        ScenarioError: if it is none.
+    """
+    if not isinstance(value, Scenario):
+        raise ScenarioError(Problem("scenario", value, "a value of type Scenario"))
+
+
 def load_scenario(path: str | Path) -> Scenario:
     """Scenario from a YAML file.
 
@@ -77,8 +89,8 @@ def load_scenario(path: str | Path) -> Scenario:
     """
     from cbrrt_ompl.plain_yaml import read_yaml
 
-    path = Path(path)
-    if not (path.suffix or path.parent.name or path.exists()):
+    path = as_path(path, ScenarioError)
+    if not (path.suffix or path.parent.name or os.path.exists(path)):
         path = scenario_path(path.name)
     report = Report()
     try:
@@ -111,26 +123,24 @@ def save_scenario(scenario: Scenario, path: str | Path) -> None:
 
     Args:
         scenario: what to write.
-        path: the file, overwritten if there is one; a map is referred to relative to its folder.
+        path: the file; an old one stays whole until the new one is; a map is referred to relative to its folder.
 
     Raises:
         ScenarioError: if the file cannot be written.
     """
-    from cbrrt_ompl.plain_yaml import Remark, dump_line
+    from cbrrt_ompl.plain_yaml import dump_line
 
+    check_scenario(scenario)
     lines = []
-    for key, value in scenario_to_dict(scenario, Path(path).parent).items():
+    path = as_path(path, ScenarioError)
+    for key, value in scenario_to_dict(scenario, path.parent).items():
         if key == "obstacles" and value:
             lines += [f"{key}:", *(f"  - {{{dump_line(obstacle)}}}" for obstacle in value)]
         elif key == "robot":
             lines += [f"{key}:", *(f"  {dump_line({part: content})}" for part, content in value.items())]
         else:
             lines.append(dump_line({key: value}))
-    try:
-        Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
-    except OSError as error:
-        problem = Problem("", Remark(error.strerror or str(error)), "a file that can be written")
-        raise ScenarioError(problem, str(path)) from None
+    write_file(path, "\n".join(lines) + "\n", ScenarioError)
 
 
 def scenario_from_dict(data: Mapping[str, Any], source: str = "scenario", folder: Path | None = None) -> Scenario:
@@ -147,7 +157,7 @@ def scenario_from_dict(data: Mapping[str, Any], source: str = "scenario", folder
     Raises:
         ScenarioError: with every mistake in the values, one line each.
     """
-    return _make(data, source, folder or Path(), Report())
+    return _make(data, source, Path() if folder is None else as_path(folder, ScenarioError), Report())
 
 
 def scenario_to_dict(scenario: Scenario, folder: Path | None = None) -> dict[str, Any]:
@@ -160,7 +170,8 @@ def scenario_to_dict(scenario: Scenario, folder: Path | None = None) -> dict[str
     Returns:
         Mappings, lists, texts and numbers that :func:`scenario_from_dict` makes an equal scenario of.
     """
-    return scenario_data(scenario, (folder or Path()).resolve())
+    check_scenario(scenario)
+    return scenario_data(scenario, (Path() if folder is None else as_path(folder, ScenarioError)).resolve())
 
 
 def find_problems(parts: Mapping[str, Any]) -> list[Problem]:
@@ -195,6 +206,20 @@ def _make(data: object, source: str, folder: Path, report: Report) -> Scenario:
     return Scenario(**parts)
 
 
+def _check_types(scenario: Scenario) -> None:
+    """Refuse parts of the wrong type, all together."""
+    kinds = {"world": World, "robot": Robot, "start": State, "goal": Goal, "planning": PlanningSettings}
+    problems = [
+        Problem(name, getattr(scenario, name), f"a value of type {kind.__name__}")
+        for name, kind in kinds.items()
+        if not isinstance(getattr(scenario, name), kind)
+    ]
+    if not isinstance(scenario.map, MapSource | None):
+        problems.append(Problem("map", scenario.map, "a value of type MapSource, or None"))
+    if problems:
+        raise ScenarioError(problems)
+
+
 def _name_problems(name: str) -> Iterator[Problem]:
     if not (isinstance(name, str) and name.strip() and name.isprintable()):
         yield Problem("name", name, "one line of text")
@@ -202,8 +227,8 @@ def _name_problems(name: str) -> Iterator[Problem]:
 
 def _start_problems(start: State, world: World | None, robot: Robot | None) -> Iterator[Problem]:
     """Why the robot cannot start from a state."""
-    infinite = [name for name, value in start._asdict().items() if not math.isfinite(value)]
-    yield from (Problem(f"start.{name}", getattr(start, name), "a finite number") for name in infinite)
+    infinite = [name for name, value in start._asdict().items() if not is_number(value, LARGEST)]
+    yield from (Problem(f"start.{name}", getattr(start, name), A_NUMBER) for name in infinite)
     if infinite:
         return
     if robot is not None:

@@ -7,10 +7,10 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from numbers import Real
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeGuard, TypeVar
 
-from cbrrt_ompl.errors import MISSING, InputError, Problem
-from cbrrt_ompl.plain_yaml import Remark, key_path
+from cbrrt_ompl.errors import MISSING, InputError, Problem, Remark
+from cbrrt_ompl.plain_yaml import key_path
 
 T = TypeVar("T")
 
@@ -115,13 +115,25 @@ def build(make: Callable[..., T], values: Mapping[str, Any] | None, path: str, r
         return None
 
 
+def is_number(value: object, most: float = math.inf) -> TypeGuard[float]:
+    """Whether a value is a finite number and no truth value.
+
+    Args:
+        value: anything.
+        most: largest absolute value.
+    """
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return False
+    try:
+        return math.isfinite(value) and abs(float(value)) <= most
+    except OverflowError:
+        return False
+
+
 def number(value: object, path: str, report: Report) -> float | None:
     """A finite number."""
-    try:
-        if isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value):
-            return float(value)
-    except OverflowError:
-        pass
+    if is_number(value):
+        return float(value)
     report.add(path, value, "a finite number")
     return None
 

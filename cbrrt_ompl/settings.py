@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Integral
 from typing import NamedTuple
 
+import numpy as np
+
 from cbrrt_ompl.errors import Problem, SettingsError
-from cbrrt_ompl.robot import Limits
+from cbrrt_ompl.robot import A_NUMBER, A_POSITIVE_NUMBER, LARGEST, Limits
+from cbrrt_ompl.sections import is_number
 
 CUT_EXTENSION = ("discard", "keep")
 """What may become of an extension that meets an obstacle before its horizon."""
@@ -58,15 +62,15 @@ class Goal:
 
     def __post_init__(self) -> None:
         """Check all values together."""
+        optional = [name for name in ("theta", "speed_tolerance") if getattr(self, name) is None]
         problems = [
-            Problem(f"goal.{name}", getattr(self, name), "a finite number")
+            Problem(f"goal.{name}", getattr(self, name), A_NUMBER)
             for name in ("x", "y", "theta")
-            if getattr(self, name) is not None and not math.isfinite(getattr(self, name))
+            if name not in optional and not is_number(getattr(self, name), LARGEST)
         ]
         for name in ("tolerance", "heading_tolerance", "speed_tolerance"):
-            value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and value > 0.0):
-                problems.append(Problem(f"goal.{name}", value, "a number above 0"))
+            if name not in optional and not _is_positive(getattr(self, name)):
+                problems.append(Problem(f"goal.{name}", getattr(self, name), A_POSITIVE_NUMBER))
         if problems:
             raise SettingsError(problems)
 
@@ -136,27 +140,30 @@ class PlanningSettings:
     def __post_init__(self) -> None:
         """Check all values together."""
         problems = [
-            Problem(f"planning.{name}", getattr(self, name), "a number above 0 [s]")
+            Problem(f"planning.{name}", getattr(self, name), f"{A_POSITIVE_NUMBER} [s]")
             for name in ("horizon", "step")
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0)
+            if not _is_positive(getattr(self, name))
         ]
-        if not problems and not 1 <= round(self.horizon / self.step) <= MAX_STEPS:
+        if not problems and not 0.5 < self.horizon / self.step <= MAX_STEPS + 0.5:
             problems.append(
                 Problem("planning.horizon", self.horizon, f"1 to {MAX_STEPS} steps of {self.step:g} s (planning.step)")
             )
-        if not 0.0 <= self.goal_bias <= 1.0:
+        if not (is_number(self.goal_bias) and 0.0 <= self.goal_bias <= 1.0):
             problems.append(Problem("planning.goal_bias", self.goal_bias, "a number from 0 to 1"))
-        if not (isinstance(self.max_samples, int) and self.max_samples >= 1):
-            problems.append(Problem("planning.max_samples", self.max_samples, "a whole number of 1 or more"))
+        if not (is_number(self.max_samples) and isinstance(self.max_samples, Integral)) or not (
+            1 <= self.max_samples <= MAX_SAMPLES
+        ):
+            expected = f"a whole number of 1 or more, at most {MAX_SAMPLES}"
+            problems.append(Problem("planning.max_samples", self.max_samples, expected))
         for name, known in (("cut_extension", CUT_EXTENSION), ("nearest_neighbour", NEAREST_NEIGHBOUR)):
-            if getattr(self, name) not in known:
+            if not (isinstance(getattr(self, name), str) and getattr(self, name) in known):
                 problems.append(Problem(f"planning.{name}", getattr(self, name), f"one of {', '.join(known)}"))
-        if not math.isfinite(self.equal_control_tolerance):
-            problems.append(
-                Problem("planning.equal_control_tolerance", self.equal_control_tolerance, "a finite number")
-            )
-        if self.look_ahead is not None and not (math.isfinite(self.look_ahead) and self.look_ahead > 0.0):
-            problems.append(Problem("planning.look_ahead", self.look_ahead, "a number above 0 [m]"))
+        if not is_number(self.equal_control_tolerance, LARGEST):
+            problems.append(Problem("planning.equal_control_tolerance", self.equal_control_tolerance, A_NUMBER))
+        if self.look_ahead is not None and not _is_positive(self.look_ahead):
+            problems.append(Problem("planning.look_ahead", self.look_ahead, f"{A_POSITIVE_NUMBER} [m]"))
+        if not isinstance(self.closed_loop, bool | np.bool_):
+            problems.append(Problem("planning.closed_loop", self.closed_loop, "True or False"))
         if problems:
             raise SettingsError(problems)
 
@@ -173,6 +180,14 @@ class PlanningSettings:
         """Largest distance of the reference from its node for a robot [m]."""
         return limits.v_max * self.horizon if self.look_ahead is None else self.look_ahead
 
+
+def _is_positive(value: object) -> bool:
+    """Whether a value is a number above 0 of a size that we can compute with."""
+    return is_number(value, LARGEST) and value > 0.0
+
+
+MAX_SAMPLES = 1_000_000_000
+"""Samples that a plan may draw at most: nodes are counted in 32 bits."""
 
 MAX_STEPS = 100_000
 """Steps that one extension may have: what a control duration and its buffers are made for."""

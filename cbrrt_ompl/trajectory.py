@@ -6,7 +6,6 @@ import io
 import json
 import math
 import os
-import uuid
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cbrrt_ompl.errors import MISSING, Problem, TrajectoryError
+from cbrrt_ompl.files import as_path, write_file
 from cbrrt_ompl.settings import MAX_STEPS
 
 if TYPE_CHECKING:
@@ -91,6 +91,8 @@ class Trajectory:
         problems = _problems(arrays, lambda name, row: f"{name}[{row}]")
         if problems:
             raise TrajectoryError(problems)
+        if not isinstance(self.kinematic, bool | np.bool_):
+            raise TrajectoryError(Problem("kinematic", self.kinematic, "True or False"))
         for name, array in arrays.items():
             array.setflags(write=False)
             object.__setattr__(self, name, array)
@@ -162,9 +164,9 @@ class Trajectory:
             Rows of (x, y, theta, v, omega), shape (m, 5) [m, m, rad, m/s, rad/s]; the stored rows at their times.
 
         Raises:
-            TrajectoryError: if a time is outside the trajectory.
+            TrajectoryError: if a time is no number, or outside the trajectory.
         """
-        times = np.atleast_1d(np.asarray(times, dtype=float))
+        times = _array("times", np.atleast_1d(times))
         outside = ~((times >= self.t[0]) & (times <= self.t[-1]))
         if outside.any():
             expected = f"times from {self.t[0]:g} to {self.t[-1]:g} s"
@@ -251,12 +253,8 @@ class Trajectory:
         Raises:
             TrajectoryError: if the suffix is another one or the file cannot be written.
         """
-        path = Path(path)
-        content = _FORMATS[_suffix(path)].encode(self)
-        try:
-            _replace(path, content)
-        except OSError as error:
-            raise TrajectoryError(Problem("", error.strerror, "a file that can be written"), str(path)) from error
+        path = as_path(path, TrajectoryError)
+        write_file(path, _FORMATS[_suffix(path)].encode(self), TrajectoryError)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], kinematic: bool = False) -> Trajectory:
@@ -272,7 +270,7 @@ class Trajectory:
         Raises:
             TrajectoryError: if the file is missing, has another suffix or holds no trajectory.
         """
-        path = Path(path)
+        path = as_path(path, TrajectoryError)
         decode = _FORMATS[_suffix(path)].decode
         try:
             content = path.read_bytes()
@@ -372,17 +370,6 @@ def _suffix(path: Path) -> str:
     if suffix not in _FORMATS:
         raise TrajectoryError(Problem("suffix", path.suffix, f"one of {', '.join(sorted(_FORMATS))}"), str(path))
     return suffix
-
-
-def _replace(path: Path, content: bytes) -> None:
-    """Write a file beside the old one and put it into its place."""
-    target = path.resolve()
-    draft = target.with_name(f".{target.name}.{uuid.uuid4().hex}.tmp")
-    try:
-        draft.write_bytes(content)
-        os.replace(draft, target)
-    finally:
-        draft.unlink(missing_ok=True)
 
 
 def _encode_csv(trajectory: Trajectory) -> bytes:

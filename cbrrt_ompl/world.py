@@ -10,6 +10,7 @@ centimetres, and between `fcl.Convex` and `fcl.BVHModel` by decimetres.)
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import Any
@@ -65,7 +66,7 @@ MITRE_LIMIT = 5.0
 
 
 class World:
-    """Bounds and obstacles, ready for collision queries.
+    """Bounds and obstacles, ready for collision queries from any thread.
 
     Attributes:
         bounds: the walls around everything.
@@ -78,12 +79,22 @@ class World:
         Args:
             bounds: the walls.
             obstacles: boxes, discs and polygons, any number.
+
+        Raises:
+            WorldError: if these are no bounds or no obstacles.
         """
+        if not isinstance(bounds, Bounds):
+            raise WorldError(Problem("bounds", bounds, "a value of type Bounds"))
+        if not isinstance(obstacles, Iterable):
+            raise WorldError(Problem("obstacles", obstacles, "a list of obstacles"))
         self.bounds = bounds
         self.obstacles: tuple[Obstacle, ...] = tuple(obstacles)
+        for i, obstacle in enumerate(self.obstacles):
+            if not isinstance(obstacle, Obstacle):
+                raise WorldError(Problem(f"obstacles[{i}]", obstacle, "a Box, OrientedBox, Disc or Polygon"))
         height = 4.0 * (max(bounds.size) + max(map(_extent, self.obstacles), default=0.0))
         self._solids = _manager([_solid(o, height) for o in (*bounds.walls(), *self.obstacles)])
-        self._checkers: dict[Footprint, CollisionChecker] = {}
+        self._checkers = _Checkers()
 
     @classmethod
     def from_grid(
@@ -183,14 +194,26 @@ class World:
         return self.checker(Footprint.point()).signed_clearance(x, y)
 
     def checker(self, footprint: Footprint) -> CollisionChecker:
-        """The checker for one footprint, made once and kept."""
-        if footprint not in self._checkers:
-            self._checkers[footprint] = CollisionChecker(self, footprint)
-        return self._checkers[footprint]
+        """The checker for one footprint, made once a thread and kept."""
+        checkers = self._checkers.by_footprint
+        if footprint not in checkers:
+            checkers[footprint] = CollisionChecker(self, footprint)
+        return checkers[footprint]
+
+    def __reduce__(self) -> tuple[type[World], tuple[Bounds, tuple[Obstacle, ...]]]:
+        """What is pickled: FCL's objects are made again from bounds and obstacles."""
+        return World, (self.bounds, self.obstacles)
 
     @cached_property
     def _polygons(self) -> _Polygons:
         return _Polygons([o for o in self.obstacles if isinstance(o, Polygon)])
+
+
+class _Checkers(threading.local):
+    """The checkers of a thread: each moves FCL objects of its own."""
+
+    def __init__(self) -> None:
+        self.by_footprint: dict[Footprint, CollisionChecker] = {}
 
 
 class CollisionChecker:

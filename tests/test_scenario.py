@@ -352,14 +352,22 @@ MISTAKES = {
         "[5, 30]",
         "robot.limits.omega_deg: got [5, 30], expected a range [low, high] with low <= 0 < high",
     ),
-    "negative gain": ("k_y: 0.5", "k_y: -0.5", "robot.gains.k_y: got -0.5, expected a finite number, 0 or more"),
-    "negative tolerance": ("tolerance: 0.5", "tolerance: -0.5", "goal.tolerance: got -0.5, expected a number above 0"),
+    "negative gain": (
+        "k_y: 0.5",
+        "k_y: -0.5",
+        "robot.gains.k_y: got -0.5, expected a finite number, 0 or more and at most 1e+06",
+    ),
+    "negative tolerance": (
+        "tolerance: 0.5",
+        "tolerance: -0.5",
+        "goal.tolerance: got -0.5, expected a number above 0, at most 1e+06",
+    ),
     "heading tolerance without heading": (
         "tolerance: 0.5",
         "heading_tolerance_deg: 5",
         "goal.theta: missing, expected the heading that goal.heading_tolerance is about [rad]",
     ),
-    "zero step": ("step: 0.05", "step: 0", "planning.step: got 0.0, expected a number above 0 [s]"),
+    "zero step": ("step: 0.05", "step: 0", "planning.step: got 0.0, expected a number above 0, at most 1e+06 [s]"),
     "goal bias": ("goal_bias: 0.0", "goal_bias: 1.5", "planning.goal_bias: got 1.5, expected a number from 0 to 1"),
     "horizon of 6.67 steps": (
         "step: 0.05",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import fcntl
-import os
 import re
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -20,6 +19,7 @@ from cbrrt_ompl.benchmark.local import run_locally
 from cbrrt_ompl.benchmark.log import Log, format_log, merge_logs, read_log
 from cbrrt_ompl.errors import CbrrtError, InputError, Problem, SettingsError, UnknownPlannerError
 from cbrrt_ompl.extension import check_step
+from cbrrt_ompl.files import write_file
 from cbrrt_ompl.planning import PLANNERS
 from cbrrt_ompl.scenario import Scenario, load_scenario, scenario_to_dict
 
@@ -172,9 +172,9 @@ def run_campaign(
             for case, outcome in outcomes:
                 if outcome.log is None:
                     crashes[case.name] = outcome.error.partition("\n")[0]
-                    _write(case_dir / f"{case.name}.error", outcome.error)
+                    write_file(case_dir / f"{case.name}.error", outcome.error)
                 else:
-                    _write(case_dir / f"{case.name}.log", outcome.log)
+                    write_file(case_dir / f"{case.name}.log", outcome.log)
                     (case_dir / f"{case.name}.error").unlink(missing_ok=True)
                     finished[case.name] = read_log(case_dir / f"{case.name}.log")
                 done += len(case.seeds)
@@ -183,7 +183,7 @@ def run_campaign(
         for experiment in campaign.scenarios:
             parts = _with_crashes([case for case in cases if case.experiment == experiment], finished)
             logs.append(merge_logs(parts, experiment, campaign.seed, campaign.runs))
-            _write(log_dir / f"{experiment}.log", format_log(logs[-1]))
+            write_file(log_dir / f"{experiment}.log", format_log(logs[-1]))
         write_database(database, logs)
     return Summary(done, kept, crashes)
 
@@ -204,16 +204,6 @@ def _finished_log(case_dir: Path, case: Case) -> Log | None:
     except (FileNotFoundError, InputError):
         return None
     return log
-
-
-def _write(path: Path, text: str) -> None:
-    """Write a file that is whole or not there at all."""
-    unfinished = path.with_name(f"{path.name}.part")
-    with open(unfinished, "w", encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(unfinished, path)
 
 
 @contextmanager

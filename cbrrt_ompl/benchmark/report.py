@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -25,6 +26,7 @@ from cbrrt_ompl.benchmark.statistics import (
     wilson_interval,
 )
 from cbrrt_ompl.errors import UnknownPlannerError
+from cbrrt_ompl.files import save_figure, write_file
 
 SUMMARY_COLUMNS = (
     "scenario", "planner", "runs", "successes", "success_rate", "success_low", "success_high", "invalid", "crashed",
@@ -57,8 +59,8 @@ def write_report(database: Path, output: Path, reference: str | None = None) -> 
         reference: planner that the report compares the others with; None takes `cb-rrt`, or else the first one.
 
     Raises:
-        InputError: if the file is no benchmark database, or does not have the reference.
-        OSError: if nothing can be written.
+        InputError: if the file is no benchmark database, does not have the reference, or nothing can be written.
+        OSError: if the folder cannot be made.
     """
     experiments = read_experiments(database)
     planners = list(dict.fromkeys(one.planner for experiment in experiments for one in experiment.series))
@@ -72,10 +74,10 @@ def write_report(database: Path, output: Path, reference: str | None = None) -> 
     _write_csv(output / "summary.csv", SUMMARY_COLUMNS, summary)
     _write_csv(output / "ratios.csv", RATIO_COLUMNS, _ratio_rows(ratios))
     for experiment in experiments:
-        success_figure(experiment).savefig(output / f"success_{experiment.name}.png")
-        boxes_figure(experiment).savefig(output / f"boxes_{experiment.name}.png")
+        save_figure(success_figure(experiment), output / f"success_{experiment.name}.png")
+        save_figure(boxes_figure(experiment), output / f"boxes_{experiment.name}.png")
     path = output / "report.md"
-    path.write_text("\n".join(_markdown(experiments, reference, ratios)), encoding="utf-8")
+    write_file(path, "\n".join(_markdown(experiments, reference, ratios)))
     rows = (dict(zip(SUMMARY_COLUMNS, row, strict=True)) for row in summary)
     return Report(path, tuple(_invalid(experiments)), tuple(rows))
 
@@ -261,7 +263,8 @@ def _ratio_rows(ratios: dict[str, Ratios]) -> Iterator[tuple[object, ...]]:
 
 def _write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     """Write a table with full precision."""
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(header)
-        writer.writerows(rows)
+    buffer = io.StringIO(newline="")
+    writer = csv.writer(buffer)
+    writer.writerow(header)
+    writer.writerows(rows)
+    write_file(path, buffer.getvalue())

@@ -5,9 +5,9 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
-from cbrrt_ompl.errors import MapError, Problem, WorldError
+from cbrrt_ompl.errors import MapError, Problem, Remark, WorldError
+from cbrrt_ompl.files import as_path
 from cbrrt_ompl.obstacles import Disc
-from cbrrt_ompl.plain_yaml import Remark
 
 HEADER = ["x", "y", "radius"]
 
@@ -25,7 +25,7 @@ def load_discs(path: str | Path) -> list[Disc]:
         MapError: with every line that holds no disc.
     """
     try:
-        with Path(path).open(encoding="utf-8-sig", newline="") as file:
+        with as_path(path, MapError).open(encoding="utf-8-sig", newline="") as file:
             rows = list(csv.reader(file))
     except (OSError, ValueError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or str(error)

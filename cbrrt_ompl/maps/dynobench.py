@@ -6,11 +6,24 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cbrrt_ompl.errors import InputError, MapError
+from cbrrt_ompl.errors import InputError, MapError, Problem, SettingsError
+from cbrrt_ompl.files import as_path
 from cbrrt_ompl.obstacles import Bounds, Box
 from cbrrt_ompl.plain_yaml import read_yaml
 from cbrrt_ompl.robot import Footprint, Limits, Robot
-from cbrrt_ompl.sections import Converter, Key, Report, build, list_of, number, one_of, pair_of, read_section, text
+from cbrrt_ompl.sections import (
+    Converter,
+    Key,
+    Report,
+    build,
+    is_number,
+    list_of,
+    number,
+    one_of,
+    pair_of,
+    read_section,
+    text,
+)
 from cbrrt_ompl.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.world import World
 
@@ -50,8 +63,10 @@ def load_dynobench(
     """
     from cbrrt_ompl.scenario import Scenario
 
-    model = _read(Path(model_path), _MODEL)
-    problem = _read(Path(problem_path), _PROBLEM)
+    if not (is_number(tolerance) and tolerance > 0.0):
+        raise SettingsError(Problem("tolerance", tolerance, "a number above 0"))
+    model = _read(as_path(model_path, MapError), _MODEL)
+    problem = _read(as_path(problem_path, MapError), _PROBLEM)
     limits = Limits(**{ours: model[theirs] for ours, theirs in _LIMITS.items()})
     length, width = model["size"]
     corners = [(-length, -width), (length, -width), (length, width), (-length, width)]

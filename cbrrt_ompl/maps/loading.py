@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from cbrrt_ompl.errors import MISSING, MapError, Problem
+from cbrrt_ompl.errors import MISSING, MapError, Problem, Remark
+from cbrrt_ompl.files import as_path
 from cbrrt_ompl.maps.image import read_image
 from cbrrt_ompl.maps.map_server import read_map_server
 from cbrrt_ompl.maps.movingai import read_movingai
 from cbrrt_ompl.maps.occupancy_map import OccupancyMap
 from cbrrt_ompl.occupancy import OCCUPIED
-from cbrrt_ompl.plain_yaml import Remark
 
 ROS_SUFFIXES = (".yaml", ".yml")
 IMAGE_SUFFIXES = (".bmp", ".gif", ".jpeg", ".jpg", ".pbm", ".pgm", ".png", ".ppm")
@@ -41,7 +41,7 @@ def load_map(
     Raises:
         MapError: if it cannot be read, in one line a mistake, or if every cell is occupied.
     """
-    path = Path(path)
+    path = as_path(path, MapError)
     suffix = path.suffix.lower()
     if suffix in ROS_SUFFIXES:
         cells, own_resolution, own_origin = read_map_server(path)
@@ -56,7 +56,7 @@ def load_map(
         )
     else:
         cells = read_movingai(path) if suffix == MOVINGAI_SUFFIX else read_image(path)
-    pose = (0.0, 0.0, 0.0) if origin is None else tuple(origin)
+    pose = (0.0, 0.0, 0.0) if origin is None else origin
     found = OccupancyMap(cells, resolution, pose, unknown, str(path))  # type: ignore[arg-type]  # checked in there
     if (found.cells == OCCUPIED).all():
         raise MapError(Problem("cells", Remark("only occupied ones"), "a free one"), str(path))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cbrrt_ompl.errors import MISSING, InputError, MapError, Problem
+from cbrrt_ompl.files import write_files
 from cbrrt_ompl.maps.image import MODES, UNKNOWN_GREY, Reading, cells_of
 from cbrrt_ompl.maps.pixels import read_pixels
 from cbrrt_ompl.occupancy import FREE, FREE_THRESHOLD, OCCUPIED, OCCUPIED_THRESHOLD, UNKNOWN
-from cbrrt_ompl.plain_yaml import Remark, dump_line, read_yaml
+from cbrrt_ompl.plain_yaml import dump_line, read_yaml
+from cbrrt_ompl.sections import is_number
 
 if TYPE_CHECKING:
     from cbrrt_ompl.maps.occupancy_map import OccupancyMap
@@ -73,14 +74,9 @@ def write_map_server(grid: OccupancyMap, path: Path) -> None:
         "occupied_thresh": OCCUPIED_THRESHOLD,
         "free_thresh": FREE_THRESHOLD,
     }
-    try:
-        with image.open("wb") as file:
-            file.write(f"P5\n{columns} {rows}\n255\n".encode("ascii"))
-            file.write(greys.tobytes())
-        path.write_text("".join(f"{dump_line({key: value})}\n" for key, value in keys.items()), encoding="utf-8")
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise MapError(Problem("", Remark(reason), "a file that can be written"), str(path)) from None
+    pixels = f"P5\n{columns} {rows}\n255\n".encode("ascii") + greys.tobytes()
+    lines = "".join(f"{dump_line({key: value})}\n" for key, value in keys.items())
+    write_files({image: pixels, path: lines}, MapError)
 
 
 def _image(data: Mapping[object, object], path: Path, problems: list[Problem]) -> Path | None:
@@ -101,15 +97,15 @@ def _image(data: Mapping[object, object], path: Path, problems: list[Problem]) -
 
 def _resolution(data: Mapping[object, object], problems: list[Problem]) -> float | None:
     value = data.get("resolution", MISSING)
-    if _is_number(value) and float(value) > 0.0:  # type: ignore[arg-type]  # _is_number tells
-        return float(value)  # type: ignore[arg-type]  # as above
+    if is_number(value) and value > 0.0:
+        return float(value)
     problems.append(Problem("resolution", value, "the side of a cell, a number above 0 [m]"))
     return None
 
 
 def _origin(data: Mapping[object, object], problems: list[Problem]) -> tuple[float, float, float] | None:
     value = data.get("origin", MISSING)
-    if isinstance(value, list) and len(value) == 3 and all(_is_number(entry) for entry in value):
+    if isinstance(value, list) and len(value) == 3 and all(is_number(entry) for entry in value):
         x, y, yaw = value
         return float(x), float(y), float(yaw)
     problems.append(Problem("origin", value, "three finite numbers [x, y, yaw] [m, m, rad]"))
@@ -128,7 +124,7 @@ def _reading(data: Mapping[object, object], problems: list[Problem]) -> Reading:
     wrong = [
         Problem(name, value, "a number from 0 to 1")
         for name, value in (("occupied_thresh", occupied), ("free_thresh", free))
-        if not _is_number(value) or not 0.0 <= float(value) <= 1.0  # type: ignore[arg-type]  # _is_number tells
+        if not (is_number(value) and 0.0 <= value <= 1.0)
     ]
     if not wrong and free > occupied:  # type: ignore[operator]  # both are numbers
         wrong.append(Problem("free_thresh", free, f"at most occupied_thresh, which is {occupied}"))
@@ -136,8 +132,3 @@ def _reading(data: Mapping[object, object], problems: list[Problem]) -> Reading:
     if wrong:
         return Reading()
     return Reading(str(mode), bool(negate), float(occupied), float(free))  # type: ignore[arg-type]  # as above
-
-
-def _is_number(value: object) -> bool:
-    """Whether a value is a finite number."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

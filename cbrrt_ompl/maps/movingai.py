@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.errors import MISSING, MapError, Problem
+from cbrrt_ompl.errors import MISSING, MapError, Problem, Remark
 from cbrrt_ompl.occupancy import FREE, MAX_CELLS, OCCUPIED, check_cell_count
-from cbrrt_ompl.plain_yaml import Remark
 
 FREE_TERRAIN, BLOCKED_TERRAIN = b".GS", b"@OTW"
 """Ground and swamp can be driven on; out of bounds, trees and water can not."""

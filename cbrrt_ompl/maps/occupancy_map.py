@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cbrrt_ompl.errors import MapError, Problem
+from cbrrt_ompl.errors import MapError, Problem, Remark
+from cbrrt_ompl.files import as_path
 from cbrrt_ompl.obstacles import Bounds, Obstacle
 from cbrrt_ompl.occupancy import (
     FREE,
@@ -25,7 +27,6 @@ from cbrrt_ompl.occupancy import (
     grid_bounds,
     grid_obstacles,
 )
-from cbrrt_ompl.plain_yaml import Remark
 from cbrrt_ompl.world import World
 
 
@@ -53,14 +54,17 @@ class OccupancyMap:
 
     def __post_init__(self) -> None:
         """Check and freeze everything."""
-        cells = np.array(self.cells)
+        try:
+            cells: NDArray[Any] = np.array(self.cells)
+        except ValueError:  # rows of different lengths
+            cells = np.empty(0)
         if cells.ndim != 2 or cells.size == 0:
             raise MapError(Problem("cells", Remark(f"the shape {cells.shape}"), "rows and columns"), self.source)
         check_cell_count(cells.shape, "cells")
         if not ((cells == UNKNOWN) | (cells == FREE) | (cells == OCCUPIED)).all():
             expected = f"only {OCCUPIED} (occupied), {FREE} (free) and {UNKNOWN} (unknown)"
             raise MapError(Problem("cells", Remark("other values"), expected), self.source)
-        if self.unknown not in UNKNOWN_CELLS:
+        if not (isinstance(self.unknown, str) and self.unknown in UNKNOWN_CELLS):
             problem = Problem("unknown", self.unknown, f"one of {', '.join(UNKNOWN_CELLS)}")
             raise MapError(problem, self.source)
         try:
@@ -154,4 +158,4 @@ class OccupancyMap:
         """
         from cbrrt_ompl.maps.map_server import write_map_server
 
-        write_map_server(self, Path(path))
+        write_map_server(self, as_path(path, MapError))

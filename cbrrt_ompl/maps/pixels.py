@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from cbrrt_ompl.errors import MapError, Problem
+from cbrrt_ompl.errors import MapError, Problem, Remark
 from cbrrt_ompl.occupancy import check_cell_count
-from cbrrt_ompl.plain_yaml import Remark
 
 FORMATS = ("PNG", "PPM", "BMP", "JPEG", "GIF")
 """Formats that are read, by Pillow's names; PPM stands for PGM and PBM as well."""

@@ -13,6 +13,7 @@ from cbrrt_ompl.errors import MapError, Problem
 from cbrrt_ompl.maps.occupancy_map import OccupancyMap
 from cbrrt_ompl.obstacles import Box, Disc, Obstacle
 from cbrrt_ompl.occupancy import FREE, OCCUPIED, check_cell_count
+from cbrrt_ompl.sections import is_number
 from cbrrt_ompl.world import World
 
 SLACK = 1e-6
@@ -46,7 +47,9 @@ def rasterize(world: World, resolution: float) -> OccupancyMap:
     Raises:
         MapError: if the resolution is not above 0, or the map would be too large.
     """
-    if not (isinstance(resolution, int | float) and 0.0 < resolution < math.inf):
+    if not isinstance(world, World):
+        raise MapError(Problem("world", world, "a value of type World"))
+    if not (is_number(resolution) and resolution > 0.0):
         raise MapError(Problem("resolution", resolution, "the side of a cell, a number above 0 [m]"))
     columns, rows = (max(side / resolution, 1.0) for side in world.bounds.size)
     if columns * rows < math.inf:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import secrets
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,6 +16,9 @@ from cbrrt_ompl.ompl_plugin.setup import Equipment, make_equipped_setup
 from cbrrt_ompl.scenario import Scenario
 from cbrrt_ompl.trajectory import Trajectory
 from cbrrt_ompl.tree import Tree
+
+_ompl = threading.RLock()
+"""Held by the plan that OMPL is busy with: its seed and its log level are those of the process."""
 
 
 class Found(NamedTuple):
@@ -42,7 +46,7 @@ def run(
     on_equipped: Callable[[Equipment], None] = lambda _: None,
     prepare: Callable[[Any], None] = lambda _: None,
 ) -> Found:
-    """Set a planner up and let it solve the scenario.
+    """Set a planner up and let it solve the scenario; other threads wait, and their clocks with them.
 
     Args:
         scenario: world, robot, start, goal and settings; its ``max_samples`` is obeyed.
@@ -54,7 +58,7 @@ def run(
         on_equipped: takes what the planner was given.
         prepare: takes the ``SimpleSetup`` before it is set up, to change it.
     """
-    with quiet_ompl():
+    with _ompl, quiet_ompl():
         # OMPL complains about a second seed in a process; yet all that is random below is allocated from here on
         ou.RNG.setSeed(1 + (secrets.randbits(31) if seed is None else int(seed)))
         clearance_map = clearance_map or clearance_map_for(scenario.world, scenario.robot.footprint)

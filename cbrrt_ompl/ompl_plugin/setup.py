@@ -23,7 +23,7 @@ from cbrrt_ompl.ompl_plugin.samplers import (
 )
 from cbrrt_ompl.ompl_plugin.space import make_control_space, make_reference_space, make_state_space, set_state
 from cbrrt_ompl.ompl_plugin.validity import FclStateValidityChecker
-from cbrrt_ompl.scenario import Scenario
+from cbrrt_ompl.scenario import Scenario, check_scenario
 
 SAMPLERS: dict[str, type[ExtensionSampler]] = {
     "cb-rrt": KanayamaDirectedControlSampler,
@@ -83,6 +83,7 @@ def make_setup(scenario: Scenario, planner: str = "cb-rrt") -> Any:
         ``solve`` a time or a termination condition; ``max_samples`` is a matter of :func:`cbrrt_ompl.plan`.
 
     Raises:
+        ScenarioError: if this is no scenario.
         UnknownPlannerError: if there is no such planner.
         SettingsError: if the step is too long for the robot.
     """
@@ -99,6 +100,7 @@ def make_equipped_setup(
         planner: see :func:`make_setup`.
         clearance_map: map of the scenario's world and footprint; a new one if None.
     """
+    check_scenario(scenario)
     known = [*SAMPLERS, *COMPILED_PLANNERS, *OMPL_PLANNERS]
     if planner not in known:
         raise UnknownPlannerError(planner, known)

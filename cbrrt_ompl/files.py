@@ -1,0 +1,84 @@
+"""Files that are written whole or not at all."""
+
+from __future__ import annotations
+
+import io
+import os
+import shutil
+import uuid
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from cbrrt_ompl.errors import InputError, Problem, Remark
+
+
+def as_path(path: object, error: type[InputError]) -> Path:
+    """A path that a caller handed over.
+
+    Args:
+        path: a text or a path.
+        error: what to raise.
+
+    Raises:
+        InputError: of the kind asked for, if it is neither.
+    """
+    if isinstance(path, str | os.PathLike) and isinstance(os.fspath(path), str):
+        return Path(path)
+    raise error(Problem("path", path, "the name of a file"))
+
+
+def write_file(path: Path, content: bytes | str, error: type[InputError] = InputError) -> None:
+    """Write one file; see :func:`write_files`."""
+    write_files({path: content}, error)
+
+
+def write_files(contents: Mapping[Path, bytes | str], error: type[InputError] = InputError) -> None:
+    """Write files that belong together: each beside the old one first, then all into their places.
+
+    A full disk, an exception or a kill leaves the old files whole.
+
+    Args:
+        contents: bytes, or text to be written in UTF-8, by the name of the file.
+        error: what to raise.
+
+    Raises:
+        InputError: of the kind asked for, if a file cannot be written.
+    """
+    drafts: list[tuple[Path, Path]] = []
+    try:
+        for path, content in contents.items():
+            target = Path(os.path.realpath(path))  # a link stays a link
+            data = content.encode() if isinstance(content, str) else content
+            if target.exists() and not target.is_file():  # a device takes its bytes at once, a folder none
+                target.write_bytes(data)
+                continue
+            drafts.append((target.with_name(f".cbrrt-{uuid.uuid4().hex}.tmp"), target))
+            _write_draft(*drafts[-1], data)
+        for draft, target in drafts:
+            os.replace(draft, target)
+    except (OSError, ValueError) as cause:  # ValueError: a NUL in the name
+        reason = getattr(cause, "strerror", None) or str(cause)
+        raise error(Problem("", Remark(reason), "a file that can be written"), str(path)) from cause
+    finally:
+        for draft, _ in drafts:
+            draft.unlink(missing_ok=True)
+
+
+def _write_draft(draft: Path, target: Path, data: bytes) -> None:
+    """Write what is to become the target, with its mode, down to the disk."""
+    if target.exists():
+        target.open("r+b").close()  # a file that is read-only stays as it is
+    with draft.open("xb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+    if target.exists():
+        shutil.copymode(target, draft)
+
+
+def save_figure(figure: Any, path: Path) -> None:
+    """Write a matplotlib figure in the format of the file's suffix; see :func:`write_files`."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=path.suffix.removeprefix("."))
+    write_file(path, buffer.getvalue())

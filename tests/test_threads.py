@@ -1,0 +1,143 @@
+"""Plans from several threads and processes at once: the results are those of plans alone."""
+
+from __future__ import annotations
+
+import copy
+import multiprocessing
+import pickle
+import sys
+import threading
+from collections.abc import Iterator
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cbrrt_ompl import PlanResult, Scenario, load_scenario, plan, verify
+from cbrrt_ompl.clearance_map import clearance_map_for
+from cbrrt_ompl.robot import Footprint
+from cbrrt_ompl.scenario import scenario_from_dict
+
+JOBS = [
+    (planner, seed)
+    for planner in ("cb-rrt-compiled", "s-rrt-compiled", "cb-rrt-robust", "cb-rrt", "s-rrt", "rrt", "kpiece1")
+    for seed in (1, 2)
+]
+
+
+@pytest.fixture(scope="module")
+def scenario() -> Scenario:
+    """A wall with a gap, and a robot with corners, so that FCL is asked about single poses."""
+    return scenario_from_dict(
+        {
+            "name": "gap",
+            "bounds": {"min": [-5, -5], "max": [5, 5]},
+            "obstacles": [
+                {"type": "box", "min": [-5, -0.2], "max": [-0.6, 0.2]},
+                {"type": "polygon", "vertices": [[0.6, -0.3], [5, -0.2], [5, 0.2], [0.6, 0.3]]},
+                {"type": "disc", "center": [2, 2], "radius": 0.5},
+            ],
+            "robot": {
+                "footprint": {"type": "polygon", "vertices": [[-0.3, -0.2], [0.3, -0.2], [0.3, 0.2], [-0.3, 0.2]]}
+            },
+            "start": {"x": -3, "y": -3},
+            "goal": {"x": 3, "y": 3, "tolerance": 0.8},
+            "planning": {"max_samples": 1500},
+        }
+    )
+
+
+@pytest.fixture
+def hasty_threads() -> Iterator[None]:
+    """Threads that take turns as often as they can."""
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(interval)
+
+
+def plan_without_clock(scenario: Scenario, planner: str, seed: int) -> PlanResult:
+    return plan(scenario, planner, seed, float("inf"))
+
+
+def assert_same(found: PlanResult, alone: PlanResult) -> None:
+    assert (found.planner, found.seed, found.status) == (alone.planner, alone.seed, alone.status)
+    assert (found.nodes, found.samples) == (alone.nodes, alone.samples)
+    assert found.trajectory == alone.trajectory
+    assert np.array_equal(found.tree.states, alone.tree.states)
+
+
+def test_plans_of_many_threads_are_those_of_one(scenario: Scenario, hasty_threads: None) -> None:
+    alone = [plan_without_clock(scenario, *job) for job in JOBS]
+    assert sum(result.solved for result in alone) > len(JOBS) / 2
+    with ThreadPoolExecutor(4) as pool:
+        futures: list[Future[PlanResult]] = [
+            pool.submit(plan_without_clock, scenario, *job) for job in [*JOBS, *reversed(JOBS)]
+        ]
+        found = [future.result(timeout=60.0) for future in futures]
+    for result, expected in zip(found, [*alone, *reversed(alone)], strict=True):
+        assert_same(result, expected)
+
+
+def test_queries_and_verification_in_one_thread_leave_plans_of_another_alone(
+    scenario: Scenario, hasty_threads: None
+) -> None:
+    alone = plan_without_clock(scenario, "cb-rrt-compiled", 1)
+    assert alone.trajectory is not None
+    over = threading.Event()
+
+    def disturb() -> int:
+        rounds = 0
+        while not over.is_set():
+            assert verify(alone.trajectory, scenario).ok
+            rounds += 1
+        return rounds
+
+    with ThreadPoolExecutor(1) as pool:
+        disturbance = pool.submit(disturb)
+        try:
+            for _ in range(10):
+                assert_same(plan_without_clock(scenario, "cb-rrt-compiled", 1), alone)
+        finally:
+            over.set()
+        assert disturbance.result(timeout=60.0) > 0
+
+
+def test_each_thread_has_a_map_of_its_own(scenario: Scenario) -> None:
+    footprint = Footprint.disc(0.1)
+    mine = clearance_map_for(scenario.world, footprint)
+    with ThreadPoolExecutor(1) as pool:
+        theirs = pool.submit(clearance_map_for, scenario.world, footprint).result()
+        assert theirs is not mine
+        assert theirs.checker is not mine.checker
+        assert pool.submit(clearance_map_for, scenario.world, footprint).result() is theirs
+    assert clearance_map_for(scenario.world, footprint) is mine
+
+
+def test_plans_of_many_processes_are_those_of_one(scenario: Scenario) -> None:
+    jobs = [("cb-rrt-compiled", 1), ("cb-rrt", 2), ("cb-rrt-robust", 1)]
+    alone = [plan_without_clock(scenario, *job) for job in jobs]
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
+        futures = [pool.submit(plan_without_clock, scenario, *job) for job in jobs]
+        for future, expected in zip(futures, alone, strict=True):
+            assert_same(future.result(timeout=120.0), expected)
+
+
+def test_a_plan_within_the_progress_of_another_does_not_wait_for_it(scenario: Scenario) -> None:
+    inner: list[PlanResult] = []
+
+    def progress(samples: int, elapsed: float) -> None:
+        if not inner:
+            inner.append(plan_without_clock(scenario, "cb-rrt", 1))
+
+    plan(scenario, "pdst", 1, 1.0, progress=progress)
+    assert_same(inner[0], plan_without_clock(scenario, "cb-rrt", 1))
+
+
+def test_scenarios_and_results_survive_pickle_and_deepcopy(scenarios: Path) -> None:
+    office = load_scenario(scenarios / "office.yaml")
+    for twin in (pickle.loads(pickle.dumps(office)), copy.deepcopy(office)):
+        assert twin == office
+    result = plan_without_clock(office, "cb-rrt-compiled", 1)
+    assert_same(pickle.loads(pickle.dumps(result)), result)
