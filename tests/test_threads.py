@@ -71,9 +71,10 @@ def assert_same(found: PlanResult, alone: PlanResult) -> None:
 def test_plans_of_many_threads_are_those_of_one(scenario: Scenario, hasty_threads: None) -> None:
     alone = [plan_without_clock(scenario, *job) for job in JOBS]
     assert sum(result.solved for result in alone) > len(JOBS) / 2
+    fresh = copy.deepcopy(scenario)  # a world of which no map holds anything yet
     with ThreadPoolExecutor(4) as pool:
         futures: list[Future[PlanResult]] = [
-            pool.submit(plan_without_clock, scenario, *job) for job in [*JOBS, *reversed(JOBS)]
+            pool.submit(plan_without_clock, fresh, *job) for job in [*JOBS, *reversed(JOBS)]
         ]
         found = [future.result(timeout=60.0) for future in futures]
     for result, expected in zip(found, [*alone, *reversed(alone)], strict=True):
@@ -85,23 +86,35 @@ def test_queries_and_verification_in_one_thread_leave_plans_of_another_alone(
 ) -> None:
     alone = plan_without_clock(scenario, "cb-rrt-compiled", 1)
     assert alone.trajectory is not None
-    over = threading.Event()
+    fresh, over = [copy.deepcopy(scenario) for _ in range(5)], threading.Event()
 
     def disturb() -> int:
         rounds = 0
         while not over.is_set():
-            assert verify(alone.trajectory, scenario).ok
+            assert all(verify(alone.trajectory, one).ok for one in fresh)
             rounds += 1
         return rounds
 
     with ThreadPoolExecutor(1) as pool:
         disturbance = pool.submit(disturb)
         try:
-            for _ in range(10):
-                assert_same(plan_without_clock(scenario, "cb-rrt-compiled", 1), alone)
+            for one in fresh:
+                assert_same(plan_without_clock(one, "cb-rrt-compiled", 1), alone)
         finally:
             over.set()
         assert disturbance.result(timeout=60.0) > 0
+
+
+def test_queries_of_two_threads_do_not_meet(scenario: Scenario, hasty_threads: None) -> None:
+    """FCL's object of the footprint used to be moved by one thread while another one asked about it."""
+    footprint, places = scenario.robot.footprint, [(-3.0, -3.0, 0.3), (0.0, -1.0, 1.0), (2.0, 2.0, 0.0)]
+    alone = [scenario.world.clearance(footprint, place) for place in places]
+
+    def ask(place: tuple[float, float, float]) -> set[float]:
+        return {scenario.world.clearance(footprint, place) for _ in range(2000)}
+
+    with ThreadPoolExecutor(3) as pool:
+        assert list(pool.map(ask, places)) == [{clearance} for clearance in alone]
 
 
 def test_each_thread_has_a_map_of_its_own(scenario: Scenario) -> None:
