@@ -181,7 +181,7 @@ class Polygon:
         holes = tuple(counter_clockwise_ring(h, f"polygon.holes[{i}]") for i, h in enumerate(self.holes))
         object.__setattr__(self, "holes", holes)
         shape = self.to_shapely()
-        if not shape.is_valid:
+        if holes and not shape.is_valid:
             reason = shapely.is_valid_reason(shape).lower()
             raise WorldError(Problem("polygon.holes", len(holes), f"holes apart from each other and inside ({reason})"))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from numbers import Real
@@ -81,7 +82,8 @@ def read_partial(data: object, path: str, keys: Mapping[str, Key], report: Repor
     if not isinstance(data, Mapping):
         report.add(path, data, f"a mapping with the keys {', '.join(keys)}")
         return {}
-    for unknown in [key for key in data if key not in _names(keys)]:
+    known = _names(keys)
+    for unknown in [key for key in data if key not in known]:
         report.add(key_path(path, unknown), Remark("an unknown key"), _advice(unknown, path, keys, report))
     values = {name: _read_key(data, path, name, key, report) for name, key in keys.items()}
     return {name: value for name, value in values.items() if value is not None}
@@ -115,17 +117,17 @@ def build(make: Callable[..., T], values: Mapping[str, Any] | None, path: str, r
         return None
 
 
-def is_number(value: object, most: float = math.inf) -> TypeGuard[float]:
+def is_number(value: object, most: float = sys.float_info.max) -> TypeGuard[float]:
     """Whether a value is a finite number and no truth value.
 
     Args:
         value: anything.
         most: largest absolute value.
     """
-    if not isinstance(value, Real) or isinstance(value, bool):
+    if isinstance(value, bool) or not isinstance(value, (float, int, Real)):  # the last one takes its time
         return False
     try:
-        return math.isfinite(value) and abs(float(value)) <= most
+        return abs(value if isinstance(value, int) else float(value)) <= most  # NaN is not
     except OverflowError:
         return False
 

@@ -1,10 +1,11 @@
 """Where the robot may be: bounds and obstacles as FCL solids.
 
-The plane is the plane z = 0 of FCL's space. A disc becomes a sphere, a box a tall box, a polygon its flat triangles,
-each centred on that plane, so that every answer in the plane is FCL's answer in space. FCL answers in closed form where
-one shape is a sphere, and else by GJK, to well below the micrometre of `CONTACT_TOLERANCE`. (Tall boxes and flat
-triangles on purpose: FCL 0.7 overestimates the distance of a triangle from a box that is low for its distance by
-centimetres, and between `fcl.Convex` and `fcl.BVHModel` by decimetres.)
+The plane is the plane z = 0 of FCL's space. A disc becomes a sphere, a box a tall box, an oriented box or a polygon its
+flat triangles, each centred on that plane, so that every answer in the plane is FCL's answer in space. FCL answers in
+closed form where one shape is a sphere, and else by GJK, to well below the micrometre of `CONTACT_TOLERANCE`. (Tall
+boxes and flat triangles on purpose: FCL 0.7 overestimates the distance of a triangle from a box that is low for its
+distance by centimetres, and between `fcl.Convex` and `fcl.BVHModel` by decimetres. No box is turned, for FCL would look
+for it in a cube as wide as it is tall.)
 """
 
 from __future__ import annotations
@@ -93,7 +94,12 @@ class World:
             if not isinstance(obstacle, Obstacle):
                 raise WorldError(Problem(f"obstacles[{i}]", obstacle, "a Box, OrientedBox, Disc or Polygon"))
         height = 4.0 * (max(bounds.size) + max(map(_extent, self.obstacles), default=0.0))
-        self._solids = _manager([_solid(o, height) for o in (*bounds.walls(), *self.obstacles)])
+        straight = [o for o in self.obstacles if not isinstance(o, OrientedBox)]
+        turned = [o.vertices[[0, 1, 2, 0, 2, 3]] for o in self.obstacles if isinstance(o, OrientedBox)]
+        solids = [_solid(o, height) for o in (*bounds.walls(), *straight)]
+        if turned:  # all in one mesh, which is made much faster than many
+            solids.append(fcl.CollisionObject(_flat_triangles(np.concatenate(turned))))
+        self._solids = _manager(solids)
         self._checkers = _Checkers()
 
     @classmethod
@@ -206,7 +212,7 @@ class World:
 
     @cached_property
     def _polygons(self) -> _Polygons:
-        return _Polygons([o for o in self.obstacles if isinstance(o, Polygon)])
+        return _Polygons([o for o in self.obstacles if isinstance(o, Polygon | OrientedBox)])
 
 
 class _Checkers(threading.local):
@@ -312,7 +318,7 @@ class CollisionChecker:
 class _Polygons:
     """The polygons of a world, found by a point inside."""
 
-    def __init__(self, polygons: Sequence[Polygon]) -> None:
+    def __init__(self, polygons: Sequence[Polygon | OrientedBox]) -> None:
         self._polygons = polygons
         self._tree = shapely.STRtree([polygon.to_shapely() for polygon in polygons])
         self._boundaries: dict[int, Any] = {}
@@ -348,24 +354,19 @@ def _extent(obstacle: Obstacle) -> float:
     return float(np.ptp(obstacle.vertices, axis=0).max())
 
 
-def _solid(obstacle: Obstacle, height: float) -> Any:
+def _solid(obstacle: Box | Disc | Polygon, height: float) -> Any:
     """FCL object of an obstacle."""
     if isinstance(obstacle, Box):
         (x0, y0), (x1, y1) = obstacle.min, obstacle.max
         place = fcl.Transform(np.array([0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.0]))
         return fcl.CollisionObject(fcl.Box(x1 - x0, y1 - y0, height), place)
-    if isinstance(obstacle, OrientedBox):
-        c, s = math.cos(obstacle.angle), math.sin(obstacle.angle)
-        rotation = np.array([(c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)])
-        place = fcl.Transform(rotation, np.array([*obstacle.center, 0.0]))
-        return fcl.CollisionObject(fcl.Box(*obstacle.size, height), place)
     if isinstance(obstacle, Disc):
         place = fcl.Transform(np.array([*obstacle.center, 0.0]))
         return fcl.CollisionObject(fcl.Sphere(obstacle.radius), place)
     return fcl.CollisionObject(_flat_mesh(obstacle.to_shapely()))
 
 
-def _boundary(polygon: Polygon) -> Any:
+def _boundary(polygon: Polygon | OrientedBox) -> Any:
     """FCL object of a polygon's border alone: an upright wall of no thickness along every edge."""
     height = _extent(polygon)
     faces = []
@@ -389,8 +390,12 @@ def _mesh(corners: NDArray[np.float64]) -> Any:
 
 def _flat_mesh(polygon: shapely.Polygon) -> Any:
     """FCL mesh of a polygon's triangles in the plane z = 0."""
-    triangles = shapely.constrained_delaunay_triangles(polygon).geoms
-    corners = np.concatenate([np.asarray(t.exterior.coords)[:3] for t in triangles])  # (3 m, 2)
+    rings = shapely.get_coordinates(shapely.constrained_delaunay_triangles(polygon)).reshape(-1, 4, 2)  # closed
+    return _flat_triangles(rings[:, :3].reshape(-1, 2))
+
+
+def _flat_triangles(corners: NDArray[np.float64]) -> Any:
+    """FCL mesh of triangles in the plane z = 0 given by their corners, shape (3 m, 2)."""
     return _mesh(np.column_stack([corners, np.zeros(len(corners))]))
 
 
