@@ -557,11 +557,10 @@ def _draw_start(ax: Axes, scenario: Scenario, mark: float) -> None:
 def _draw_goal(ax: Axes, scenario: Scenario, mark: float) -> None:
     """Disc of the goal and, where it is restricted, the sector of the headings."""
     goal = scenario.goal
-    ax.add_patch(
-        Circle((goal.x, goal.y), goal.tolerance, facecolor=GOAL_COLOR, edgecolor="none", alpha=0.35, zorder=1.5)
-    )
+    radius = min(goal.tolerance, 2.0 * max(scenario.world.bounds.size))  # a larger one looks the same and takes long
+    ax.add_patch(Circle((goal.x, goal.y), radius, facecolor=GOAL_COLOR, edgecolor="none", alpha=0.35, zorder=1.5))
     border = Circle(
-        (goal.x, goal.y), goal.tolerance, fill=False, edgecolor="black", linewidth=0.9, linestyle=(0, (3, 2)), zorder=6
+        (goal.x, goal.y), radius, fill=False, edgecolor="black", linewidth=0.9, linestyle=(0, (3, 2)), zorder=6
     )
     ax.add_patch(border)
     ax.plot(
@@ -577,7 +576,7 @@ def _draw_goal(ax: Axes, scenario: Scenario, mark: float) -> None:
         label="goal",
     )
     if goal.theta is not None:
-        reach = max(mark, goal.tolerance)
+        reach = max(mark, radius)
         half, middle = math.degrees(min(goal.heading_tolerance, math.pi)), math.degrees(goal.theta)
         ax.add_patch(Wedge((goal.x, goal.y), reach, middle - half, middle + half, color="black", alpha=0.15, zorder=6))
         _draw_heading(ax, goal.x, goal.y, goal.theta, reach, "black")

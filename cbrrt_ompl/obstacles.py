@@ -12,7 +12,7 @@ import shapely
 from numpy.typing import NDArray
 
 from cbrrt_ompl.errors import Problem, WorldError
-from cbrrt_ompl.robot import LARGEST, counter_clockwise_ring
+from cbrrt_ompl.robot import LARGEST, SMALLEST, counter_clockwise_ring
 from cbrrt_ompl.sections import is_number
 
 MAX_COORDINATE = LARGEST
@@ -37,6 +37,9 @@ class Bounds:
     def __post_init__(self) -> None:
         """Check the corners."""
         _check_rectangle(self, "bounds")
+        if max(map(abs, (*self.min, *self.max))) + max(self.size) > MAX_COORDINATE:
+            expected = f"bounds whose walls, as thick as they are wide, stay within {MAX_COORDINATE:g} m of zero"
+            raise WorldError(Problem("bounds", [self.min, self.max], expected))
 
     @property
     def size(self) -> tuple[float, float]:
@@ -102,8 +105,8 @@ class OrientedBox:
         center, size = _pair(self.center), _pair(self.size)
         if center is None:
             problems.append(Problem("oriented_box.center", self.center, _COORDINATES))
-        if size is None or not min(size) > 0.0:
-            problems.append(Problem("oriented_box.size", self.size, "two sides above 0 [m]"))
+        if size is None or min(size) < SMALLEST:
+            problems.append(Problem("oriented_box.size", self.size, f"two sides above 0, {SMALLEST:g} at least [m]"))
         if not is_number(self.angle, LARGEST):
             problems.append(Problem("oriented_box.angle", self.angle, "a finite angle [rad]"))
         if problems:
@@ -148,8 +151,8 @@ class Disc:
         center = _pair(self.center)
         if center is None:
             problems.append(Problem("disc.center", self.center, _COORDINATES))
-        if not (is_number(self.radius, MAX_COORDINATE) and self.radius > 0.0):
-            problems.append(Problem("disc.radius", self.radius, "a radius above 0 [m]"))
+        if not (is_number(self.radius, MAX_COORDINATE) and self.radius >= SMALLEST):
+            problems.append(Problem("disc.radius", self.radius, f"a radius above 0, {SMALLEST:g} at least [m]"))
         if problems:
             raise WorldError(problems)
         object.__setattr__(self, "center", center)

@@ -12,6 +12,9 @@ from cbrrt_ompl.settings import State
 from cbrrt_ompl.trajectory import Trajectory
 from cbrrt_ompl.tree import Tree
 
+MAX_EDGE_POINTS = 1000
+"""Steps of an edge up to which each has its point."""
+
 
 def trajectory_from_controls(
     start: NDArray[np.float64], controls: NDArray[np.float64], steps: NDArray[np.int64], model: NDArray[np.float64]
@@ -111,12 +114,16 @@ def replay_edges(
     steps: NDArray[np.int64],
     packed: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Points (x, y) along all edges, a row of NaN after each edge, shape (m, 2)."""
+    """Points (x, y) along all edges, a row of NaN after each edge, shape (m, 2).
+
+    An edge has a point a step, or evenly fewer where it has more than `MAX_EDGE_POINTS` steps.
+    """
     model = unpack_model(packed)
     total = 0
     for i in range(len(parents)):
         if parents[i] >= 0:
-            total += steps[i] + 2
+            stride = 1 + steps[i] // (MAX_EDGE_POINTS + 1)
+            total += (steps[i] + stride - 1) // stride + 2
     points = np.empty((total, 2))
     row = 0
     for i in range(len(parents)):
@@ -126,10 +133,12 @@ def replay_edges(
         x, y, theta, v, omega = states[p, 0], states[p, 1], states[p, 2], states[p, 3], states[p, 4]
         points[row, 0], points[row, 1] = x, y
         control = (controls[i, 0], controls[i, 1], controls[i, 2])
-        for _ in range(steps[i]):
+        stride = 1 + steps[i] // (MAX_EDGE_POINTS + 1)
+        for step in range(1, steps[i] + 1):
             x, y, theta, v, omega, _, _ = advance(x, y, theta, v, omega, control, model, model.dt)
-            row += 1
-            points[row, 0], points[row, 1] = x, y
+            if step % stride == 0 or step == steps[i]:
+                row += 1
+                points[row, 0], points[row, 1] = x, y
         points[row + 1, 0], points[row + 1, 1] = np.nan, np.nan
         row += 2
     return points

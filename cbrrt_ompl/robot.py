@@ -16,8 +16,11 @@ from cbrrt_ompl.sections import is_number
 LARGEST = 1e6
 """Largest coordinate, limit, gain or setting, in SI units: beyond it, what we compute would drown in rounding."""
 
+SMALLEST = 1e-9
+"""Smallest size, limit or setting that must be above 0, in SI units, for the same reason."""
+
 A_NUMBER = f"a finite number, at most {LARGEST:g}"
-A_POSITIVE_NUMBER = f"a number above 0, at most {LARGEST:g}"
+A_POSITIVE_NUMBER = f"a number above 0, from {SMALLEST:g} to {LARGEST:g}"
 
 
 _UNLIMITED = ("wheel_speed", "wheel_acceleration")
@@ -64,12 +67,13 @@ class Limits(NamedTuple):
         if found:
             return found
         for name, low, high in (("v", self.v_min, self.v_max), ("omega", self.omega_min, self.omega_max)):
-            if not low <= 0.0 < high:
-                found.append(Problem(f"limits.{name}", [low, high], "a range [low, high] with low <= 0 < high"))
-        for name in ("acceleration", "angular_acceleration", "wheel_speed", "wheel_acceleration"):
-            if getattr(self, name) <= 0.0:
-                found.append(Problem(f"limits.{name}", getattr(self, name), "a number above 0"))
-        if self.wheel_separation < 0.0 or (self.has_wheel_limits and self.wheel_separation == 0.0):
+            if not (low <= 0.0 and high >= SMALLEST):
+                expected = f"a range [low, high] with low <= 0 < high, high at least {SMALLEST:g}"
+                found.append(Problem(f"limits.{name}", [low, high], expected))
+        for name in ("acceleration", "angular_acceleration", *_UNLIMITED):
+            if getattr(self, name) < SMALLEST:
+                found.append(Problem(f"limits.{name}", getattr(self, name), A_POSITIVE_NUMBER))
+        if self.wheel_separation < 0.0 or (self.has_wheel_limits and self.wheel_separation < SMALLEST):
             expected = "the distance between the wheels, above 0 [m]"
             found.append(Problem("limits.wheel_separation", self.wheel_separation, expected))
         return found
@@ -261,7 +265,7 @@ def counter_clockwise_ring(vertices: ArrayLike, field: str) -> NDArray[np.float6
     if len(corners) < 3:
         raise WorldError(Problem(field, vertices, "at least three corners"))
     polygon = shapely.Polygon(corners)
-    if not polygon.is_valid or polygon.area <= 0.0:
+    if not polygon.is_valid or polygon.area < SMALLEST**2:
         reason = shapely.is_valid_reason(polygon) if not polygon.is_valid else "no area"
         raise WorldError(Problem(field, vertices, f"a simple polygon with an area ({reason.lower()})"))
     ring = corners if polygon.exterior.is_ccw else corners[::-1].copy()

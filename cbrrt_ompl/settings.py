@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cbrrt_ompl.errors import Problem, SettingsError
-from cbrrt_ompl.robot import A_NUMBER, A_POSITIVE_NUMBER, LARGEST, Limits
+from cbrrt_ompl.robot import A_NUMBER, A_POSITIVE_NUMBER, LARGEST, SMALLEST, Limits
 from cbrrt_ompl.sections import is_number
 
 CUT_EXTENSION = ("discard", "keep")
@@ -183,7 +183,7 @@ class PlanningSettings:
 
 def _is_positive(value: object) -> bool:
     """Whether a value is a number above 0 of a size that we can compute with."""
-    return is_number(value, LARGEST) and value > 0.0
+    return is_number(value, LARGEST) and value >= SMALLEST
 
 
 MAX_SAMPLES = 1_000_000_000

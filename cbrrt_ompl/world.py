@@ -62,6 +62,9 @@ CONTACT_TOLERANCE = 1e-6
 _ZERO_DISTANCE = 1e-12
 """Distances up to this are contact: where shapes overlap, FCL returns 0, -1 or a denormal number [m]."""
 
+MAX_CONTACTS = 64
+"""Solids around a point whose depths are compared; of more, the depth below some is told."""
+
 MITRE_LIMIT = 5.0
 """Corners of a grown footprint reach out by at most this many tolerances."""
 
@@ -94,8 +97,9 @@ class World:
             if not isinstance(obstacle, Obstacle):
                 raise WorldError(Problem(f"obstacles[{i}]", obstacle, "a Box, OrientedBox, Disc or Polygon"))
         height = 4.0 * (max(bounds.size) + max(map(_extent, self.obstacles), default=0.0))
-        straight = [o for o in self.obstacles if not isinstance(o, OrientedBox)]
-        turned = [o.vertices[[0, 1, 2, 0, 2, 3]] for o in self.obstacles if isinstance(o, OrientedBox)]
+        different = dict.fromkeys(self.obstacles)
+        straight = [o for o in different if not isinstance(o, OrientedBox)]
+        turned = [o.vertices[[0, 1, 2, 0, 2, 3]] for o in different if isinstance(o, OrientedBox)]
         solids = [_solid(o, height) for o in (*bounds.walls(), *straight)]
         if turned:  # all in one mesh, which is made much faster than many
             solids.append(fcl.CollisionObject(_flat_triangles(np.concatenate(turned))))
@@ -212,7 +216,7 @@ class World:
 
     @cached_property
     def _polygons(self) -> _Polygons:
-        return _Polygons([o for o in self.obstacles if isinstance(o, Polygon | OrientedBox)])
+        return _Polygons([o for o in dict.fromkeys(self.obstacles) if isinstance(o, Polygon | OrientedBox)])
 
 
 class _Checkers(threading.local):
@@ -306,7 +310,7 @@ class CollisionChecker:
         distance = self._distance()
         if distance > _ZERO_DISTANCE:
             return distance
-        contacts = fcl.CollisionData(request=fcl.CollisionRequest(num_max_contacts=64, enable_contact=True))
+        contacts = fcl.CollisionData(request=fcl.CollisionRequest(num_max_contacts=MAX_CONTACTS, enable_contact=True))
         self._solids.collide(point, contacts, fcl.defaultCollisionCallback)
         touched = contacts.result.contacts
         depth = max((c.penetration_depth for c in touched if not isinstance(c.o1, fcl.BVHModel)), default=0.0)
@@ -324,10 +328,10 @@ class _Polygons:
         self._boundaries: dict[int, Any] = {}
 
     def boundaries_around(self, x: float, y: float) -> list[Any]:
-        """FCL objects of the borders of all polygons that a point is inside of."""
+        """FCL objects of the borders of polygons that a point is inside of: all, or some where there are many."""
         if not self._polygons:
             return []
-        indices = self._tree.query(shapely.Point(x, y), predicate="within").tolist()
+        indices = self._tree.query(shapely.Point(x, y), predicate="within")[:MAX_CONTACTS].tolist()
         for i in indices:
             if i not in self._boundaries:
                 self._boundaries[i] = _boundary(self._polygons[i])
