@@ -69,8 +69,9 @@ class Goal:
             if name not in optional and not is_number(getattr(self, name), LARGEST)
         ]
         for name in ("tolerance", "heading_tolerance", "speed_tolerance"):
-            if name not in optional and not _is_positive(getattr(self, name)):
-                problems.append(Problem(f"goal.{name}", getattr(self, name), A_POSITIVE_NUMBER))
+            value = getattr(self, name)
+            if name not in optional and not (is_number(value, LARGEST) and value > 0.0):
+                problems.append(Problem(f"goal.{name}", value, f"a number above 0, at most {LARGEST:g}"))
         if problems:
             raise SettingsError(problems)
 

@@ -250,7 +250,11 @@ MISTAKES = {
         "bounds: missing, expected the corners {min: [x, y], max: [x, y]} [m], or a map",
     ),
     "missing coordinate": ("x: 4, ", "", "goal.x: missing, expected a number [m]"),
-    "missing radius": (", radius: 0.3", "", "obstacles[1].radius: missing, expected a radius above 0 [m]"),
+    "missing radius": (
+        ", radius: 0.3",
+        "",
+        "obstacles[1].radius: missing, expected a radius above 0 [m]",
+    ),
     "missing type": (
         "type: disc, center",
         "center",
@@ -331,7 +335,11 @@ MISTAKES = {
         "[-2.1, -0.2]",
         "obstacles[0]: got [[-5.0, -0.1], [-2.1, -0.2]], expected min below max in x and in y",
     ),
-    "disc without area": ("radius: 0.3", "radius: 0", "obstacles[1].radius: got 0.0, expected a radius above 0 [m]"),
+    "disc without area": (
+        "radius: 0.3",
+        "radius: 0",
+        "obstacles[1].radius: got 0.0, expected a radius above 0, 1e-09 at least [m]",
+    ),
     "bounds upside down": (
         "max: [5, 5]",
         "max: [-6, 5]",
@@ -345,12 +353,12 @@ MISTAKES = {
     "negative limit": (
         "acceleration: 0.6",
         "acceleration: -0.6",
-        "robot.limits.acceleration: got -0.6, expected a number above 0",
+        "robot.limits.acceleration: got -0.6, expected a number above 0, from 1e-09 to 1e+06",
     ),
     "limit in degrees": (
         "[-30, 30]",
         "[5, 30]",
-        "robot.limits.omega_deg: got [5, 30], expected a range [low, high] with low <= 0 < high",
+        "robot.limits.omega_deg: got [5, 30], expected a range [low, high] with low <= 0 < high, high at least 1e-09",
     ),
     "negative gain": (
         "k_y: 0.5",
@@ -367,7 +375,11 @@ MISTAKES = {
         "heading_tolerance_deg: 5",
         "goal.theta: missing, expected the heading that goal.heading_tolerance is about [rad]",
     ),
-    "zero step": ("step: 0.05", "step: 0", "planning.step: got 0.0, expected a number above 0, at most 1e+06 [s]"),
+    "zero step": (
+        "step: 0.05",
+        "step: 0",
+        "planning.step: got 0.0, expected a number above 0, from 1e-09 to 1e+06 [s]",
+    ),
     "goal bias": ("goal_bias: 0.0", "goal_bias: 1.5", "planning.goal_bias: got 1.5, expected a number from 0 to 1"),
     "horizon of 6.67 steps": (
         "step: 0.05",
