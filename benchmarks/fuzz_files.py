@@ -187,7 +187,8 @@ NASTY = (
     b"\0", b"\xff\xfe", b"1e308", b"-1e308", b"1e400", b".nan", b".inf", b"-.inf", b"nan", b"inf", b"1" * 5000, b"-0",
     b"1e-320", b"999999999", b"4294967296", b"[", b"]", b"{", b"}", b": ", b"- ", b"\n", b"\r", b"\t", b"#", b"&a ",
     b"*a", b"!!python/object:os.system ", b"%", b"'", b'"', b"|", b">", b"---\n", b"...\n", b"\xc2\x85",
-    b"\xe2\x80\xa8", b"\xf0\x9f\xa4\x96", b"\x1b[2J", b",", b"null", b"true", b"~", b"[" * 200, b"{a: " * 30, b"a" * 100_000,
+    b"\xe2\x80\xa8", b"\xf0\x9f\xa4\x96", b"\x1b[2J", b",", b"null", b"true", b"~", b"[" * 200, b"{a: " * 30,
+    b"a" * 100_000,
 )  # fmt: skip
 """What is put into files."""
 

@@ -263,7 +263,7 @@ def _polygons(geometry: object) -> Iterator[shapely.Polygon]:
         for part in geometry.geoms:
             yield from _polygons(part)
     elif isinstance(geometry, list | tuple | np.ndarray):
-        for part in geometry:
+        for part in geometry.flat if isinstance(geometry, np.ndarray) else geometry:
             yield from _polygons(part)
     else:
         raise WorldError(Problem("geometry", geometry, "polygons; give points and lines an area with shapely.buffer"))
@@ -275,7 +275,9 @@ def _ring(ring: shapely.LinearRing) -> NDArray[np.float64]:
 
 def _pair(values: object) -> tuple[float, float] | None:
     """Two numbers of at most `MAX_COORDINATE`; None where they are none."""
-    if isinstance(values, Sequence | np.ndarray) and len(values) == 2:
+    if isinstance(values, np.ndarray):
+        values = values.tolist()
+    if isinstance(values, Sequence) and len(values) == 2:
         x, y = values
         if is_number(x, MAX_COORDINATE) and is_number(y, MAX_COORDINATE):
             return float(x), float(y)

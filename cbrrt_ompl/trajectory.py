@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cbrrt_ompl.errors import MISSING, Problem, TrajectoryError
 from cbrrt_ompl.files import as_path, write_file
+from cbrrt_ompl.sections import is_number
 from cbrrt_ompl.settings import MAX_STEPS
 
 if TYPE_CHECKING:
@@ -166,7 +167,7 @@ class Trajectory:
         Raises:
             TrajectoryError: if a time is no number, or outside the trajectory.
         """
-        times = _array("times", np.atleast_1d(times))
+        times = _array("times", [times] if is_number(times) else times)
         outside = ~((times >= self.t[0]) & (times <= self.t[-1]))
         if outside.any():
             expected = f"times from {self.t[0]:g} to {self.t[-1]:g} s"

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
-from cbrrt_ompl.errors import Problem, SettingsError
+from cbrrt_ompl.errors import Problem, SettingsError, TrajectoryError
+from cbrrt_ompl.sections import is_number
 from cbrrt_ompl.settings import State
 from cbrrt_ompl.trajectory import Trajectory, displacement, wrapped
 
@@ -160,10 +161,17 @@ def verify(
         The violations found, and the smallest clearance.
 
     Raises:
+        ScenarioError: if this is no scenario.
+        TrajectoryError: if this is no trajectory.
         SettingsError: if the tolerance or the resolution is no number above 0.
     """
+    from cbrrt_ompl.scenario import check_scenario
+
+    check_scenario(scenario)
+    if not isinstance(trajectory, Trajectory):
+        raise TrajectoryError(Problem("trajectory", trajectory, "a value of type Trajectory"))
     for name, value in (("tolerance", tolerance), ("resolution", resolution)):
-        if not (math.isfinite(value) and value > 0.0):
+        if not (is_number(value) and value > 0.0):
             raise SettingsError(Problem(name, value, "a number above 0"))
     footprint = scenario.robot.footprint
     checker = scenario.world.checker(footprint)

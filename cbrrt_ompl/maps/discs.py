@@ -24,8 +24,9 @@ def load_discs(path: str | Path) -> list[Disc]:
     Raises:
         MapError: with every line that holds no disc.
     """
+    path = as_path(path, MapError)
     try:
-        with as_path(path, MapError).open(encoding="utf-8-sig", newline="") as file:
+        with path.open(encoding="utf-8-sig", newline="") as file:
             rows = list(csv.reader(file))
     except (OSError, ValueError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or str(error)

@@ -102,7 +102,7 @@ def make_equipped_setup(
     """
     check_scenario(scenario)
     known = [*SAMPLERS, *COMPILED_PLANNERS, *OMPL_PLANNERS]
-    if planner not in known:
+    if not (isinstance(planner, str) and planner in known):
         raise UnknownPlannerError(planner, known)
     check_step(scenario.robot, scenario.planning)
     limits, bounds = scenario.robot.limits, scenario.world.bounds
