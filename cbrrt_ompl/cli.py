@@ -7,6 +7,7 @@ imported where they are used, so that ``cbrrt --help`` answers at once.
 from __future__ import annotations
 
 import argparse
+import io
 import json
 import math
 import os
@@ -63,6 +64,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         The exit code.
     """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # a name may hold what the terminal has no letters for
     try:
         arguments = build_parser().parse_args(argv)
         code: int = arguments.run(arguments)

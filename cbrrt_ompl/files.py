@@ -7,6 +7,7 @@ import os
 import shutil
 import uuid
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +63,8 @@ def write_files(contents: Mapping[Path, bytes | str], error: type[InputError] = 
         raise error(Problem("", Remark(reason), "a file that can be written"), str(path)) from cause
     finally:
         for draft, _ in drafts:
-            draft.unlink(missing_ok=True)
+            with suppress(OSError):  # gone into its place, or never made
+                draft.unlink()
 
 
 def _write_draft(draft: Path, target: Path, data: bytes) -> None:
