@@ -183,7 +183,8 @@ def check_frame(shape: tuple[int, ...], resolution: float, origin: Sequence[floa
     problems = []
     if not (is_number(resolution, MAX_COORDINATE) and resolution > 0.0):
         problems.append(Problem("resolution", resolution, "the side of a cell, a number above 0 [m]"))
-    values = list(origin) if isinstance(origin, Sequence | np.ndarray) and not isinstance(origin, str) else []
+    pose = origin.tolist() if isinstance(origin, np.ndarray) else origin
+    values = list(pose) if isinstance(pose, Sequence) and not isinstance(pose, str) else []
     if len(values) != 3 or not all(is_number(value, MAX_COORDINATE) for value in values):
         problems.append(Problem("origin", origin, "three finite numbers [x, y, yaw] [m, m, rad]"))
     if not problems and np.abs(grid_corners(shape, resolution, values)).max() > MAX_COORDINATE:

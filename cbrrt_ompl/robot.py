@@ -257,9 +257,9 @@ def counter_clockwise_ring(vertices: ArrayLike, field: str) -> NDArray[np.float6
     except ValueError:
         numbers = np.empty(0)
     is_list = numbers.ndim == 2 and numbers.shape[1] == 2 and numbers.dtype.kind in "fiu"
-    if not (is_list and (np.abs(numbers) <= LARGEST).all()):  # NaN is not
+    corners = numbers.astype(np.float64) if is_list else np.empty((0, 2))
+    if not (is_list and (np.abs(corners) <= LARGEST).all()):  # NaN is not
         raise WorldError(Problem(field, vertices, f"a list of [x, y] corners with finite numbers, at most {LARGEST:g}"))
-    corners = numbers.astype(np.float64)
     if len(corners) > 1 and np.array_equal(corners[0], corners[-1]):
         corners = corners[:-1]
     if len(corners) < 3:

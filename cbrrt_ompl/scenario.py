@@ -49,6 +49,7 @@ class Scenario:
         problems = find_problems({field.name: getattr(self, field.name) for field in fields(self)})
         if problems:
             raise ScenarioError(problems)
+        object.__setattr__(self, "start", State(*map(float, self.start)))
 
     def __eq__(self, other: object) -> bool:
         """Equal where all numbers are; worlds count by their bounds and obstacles."""

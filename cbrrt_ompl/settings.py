@@ -74,6 +74,7 @@ class Goal:
                 problems.append(Problem(f"goal.{name}", value, f"a number above 0, at most {LARGEST:g}"))
         if problems:
             raise SettingsError(problems)
+        _keep_floats(self, "x", "y", "tolerance", "theta", "heading_tolerance", "speed_tolerance")
 
     @property
     def is_position_only(self) -> bool:
@@ -145,7 +146,7 @@ class PlanningSettings:
             for name in ("horizon", "step")
             if not _is_positive(getattr(self, name))
         ]
-        if not problems and not 0.5 < self.horizon / self.step <= MAX_STEPS + 0.5:
+        if not problems and not 0.5 < float(self.horizon) / float(self.step) <= MAX_STEPS + 0.5:
             problems.append(
                 Problem("planning.horizon", self.horizon, f"1 to {MAX_STEPS} steps of {self.step:g} s (planning.step)")
             )
@@ -167,6 +168,7 @@ class PlanningSettings:
             problems.append(Problem("planning.closed_loop", self.closed_loop, "True or False"))
         if problems:
             raise SettingsError(problems)
+        _keep_floats(self, "horizon", "step", "goal_bias", "equal_control_tolerance", "look_ahead")
 
     def approaches(self, goal: Goal) -> bool:
         """Whether final approaches to a goal are tried."""
@@ -185,6 +187,13 @@ class PlanningSettings:
 def _is_positive(value: object) -> bool:
     """Whether a value is a number above 0 of a size that we can compute with."""
     return is_number(value, LARGEST) and value >= SMALLEST
+
+
+def _keep_floats(settings: Goal | PlanningSettings, *names: str) -> None:
+    """Turn numbers of other kinds into floats, so that all code computes with the same ones."""
+    for name in names:
+        if getattr(settings, name) is not None:
+            object.__setattr__(settings, name, float(getattr(settings, name)))
 
 
 MAX_SAMPLES = 1_000_000_000

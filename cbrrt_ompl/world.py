@@ -89,10 +89,11 @@ class World:
         """
         if not isinstance(bounds, Bounds):
             raise WorldError(Problem("bounds", bounds, "a value of type Bounds"))
-        if not isinstance(obstacles, Iterable):
-            raise WorldError(Problem("obstacles", obstacles, "a list of obstacles"))
         self.bounds = bounds
-        self.obstacles: tuple[Obstacle, ...] = tuple(obstacles)
+        try:
+            self.obstacles: tuple[Obstacle, ...] = tuple(obstacles)
+        except TypeError:
+            raise WorldError(Problem("obstacles", obstacles, "a list of obstacles")) from None
         for i, obstacle in enumerate(self.obstacles):
             if not isinstance(obstacle, Obstacle):
                 raise WorldError(Problem(f"obstacles[{i}]", obstacle, "a Box, OrientedBox, Disc or Polygon"))

@@ -8,7 +8,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
 import pytest
+
+from cbrrt_ompl import InputError
+from cbrrt_ompl.benchmark.case import Case, crash_log
+from cbrrt_ompl.benchmark.database import write_database
+from cbrrt_ompl.benchmark.results import read_experiments
 
 CASES = 400
 
@@ -37,6 +43,23 @@ def test_damaged_files_are_read_or_refused_and_nothing_else(fuzz: ModuleType, tm
         assert outcome in (fuzz.ACCEPTED, fuzz.REFUSED), f"case {number} of {kind.name}: {outcome}\n{description}"
         outcomes.append(outcome)
     assert set(outcomes) == {fuzz.ACCEPTED, fuzz.REFUSED}
+
+
+def test_a_damaged_database_is_read_or_refused(tmp_path: Path) -> None:
+    path, rng = tmp_path / "a.db", np.random.default_rng(1)
+    write_database(path, [crash_log(Case("e", {}, "rrt", 0, (1, 2, 3), 1.0, "0"))])
+    whole, refused = path.read_bytes(), 0
+    assert len(read_experiments(path)[0].series[0]) == 3
+    for _ in range(200):
+        damaged = bytearray(whole)
+        for _ in range(rng.integers(1, 30)):
+            damaged[rng.integers(len(damaged))] = rng.integers(256)
+        path.write_bytes(damaged)
+        try:
+            read_experiments(path)
+        except InputError:
+            refused += 1
+    assert refused > 20
 
 
 def fail(_: Path) -> Any:

@@ -44,7 +44,7 @@ def success_figure(experiment: Experiment) -> Figure:
     """The share of solved runs against time, for all planners of a scenario."""
     figure = Figure(figsize=(7.6, 4.2), layout="constrained", dpi=150)
     ax = draw_success(figure.subplots(), experiment.series, experiment.time_limit)
-    ax.set_title(f"{experiment.title}: runs solved within a time", fontsize=10)
+    ax.set_title(f"{experiment.title}: runs solved within a time", fontsize=10, parse_math=False)
     return figure
 
 
@@ -55,7 +55,7 @@ def boxes_figure(experiment: Experiment) -> Figure:
     for ax, (measure, label) in zip(figure.subplots(1, len(MEASURES), sharey=True), MEASURES, strict=True):
         draw_boxes(ax, experiment.series, measure)
         ax.set_xlabel(label)
-    figure.suptitle(f"{experiment.title}: every run, its quartiles, and failures", fontsize=10)
+    figure.suptitle(f"{experiment.title}: every run, its quartiles, and failures", fontsize=10, parse_math=False)
     return figure
 
 

@@ -122,7 +122,7 @@ def open_database(path: str | Path) -> sqlite3.Connection:
     connection = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)
     try:
         found = {name for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
-    except sqlite3.DatabaseError as error:
+    except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
         connection.close()
         raise InputError(Problem("", str(error), "an SQLite database"), str(path)) from None
     if not {"experiments", "plannerConfigs", "runs"} <= found:

@@ -93,10 +93,13 @@ def read_experiments(path: str | Path) -> list[Experiment]:
     """
     with closing(open_database(path)) as connection:
         connection.row_factory = sqlite3.Row
-        experiments = [
-            _read_experiment(connection, dict(row))
-            for row in connection.execute("SELECT * FROM experiments ORDER BY id")
-        ]
+        try:
+            experiments = [
+                _read_experiment(connection, dict(row))
+                for row in connection.execute("SELECT * FROM experiments ORDER BY id")
+            ]
+        except (sqlite3.DatabaseError, KeyError, TypeError, ValueError) as error:
+            raise InputError(Problem("", str(error), "an undamaged benchmark database"), str(path)) from None
     if not any(experiment.series for experiment in experiments):
         raise InputError(Problem("", "no runs", "a database with runs"), str(path))
     return experiments
