@@ -463,6 +463,7 @@ def _report(arguments: argparse.Namespace) -> int:
 
 def _reproduce(arguments: argparse.Namespace) -> int:
     """``cbrrt reproduce``."""
+    _check_backend()
     from cbrrt_ompl.reproduce.reproduction import reproduce
     from cbrrt_ompl.reproduce.study import study_size
 

@@ -62,7 +62,9 @@ class Limits(NamedTuple):
         found = [
             Problem(f"limits.{name}", value, A_NUMBER)
             for name, value in zip(self._fields, self, strict=True)
-            if not (is_number(value, LARGEST) or (name in _UNLIMITED and isinstance(value, float) and value == math.inf))
+            if not (
+                is_number(value, LARGEST) or (name in _UNLIMITED and isinstance(value, float) and value == math.inf)
+            )
         ]
         if found:
             return found

@@ -11,6 +11,7 @@ from pathlib import Path
 from cbrrt_ompl.benchmark.local import available_cores
 from cbrrt_ompl.compiled.nearest import KINDS
 from cbrrt_ompl.errors import Problem, SettingsError
+from cbrrt_ompl.files import write_file, write_files
 from cbrrt_ompl.reproduce.grids import CELLS, PLACES, RULES, GridStudy, study_grids
 from cbrrt_ompl.reproduce.machine import machine, versions
 from cbrrt_ompl.reproduce.neighbours import query_costs
@@ -115,10 +116,9 @@ def reproduce(
         )
         document, claims = make_report(material)
         for name, png in document.pictures.items():
-            (output / PICTURES / name).write_bytes(png)
+            write_file(output / PICTURES / name, png)
         page, markdown = output / "report.html", output / "report.md"
-        page.write_text(document.html(), encoding="utf-8")
-        markdown.write_text(document.markdown(PICTURES), encoding="utf-8")
+        write_files({page: document.html(), markdown: document.markdown(PICTURES)})
     return Reproduction(page, markdown, claims, outcomes.total, kept, failures)
 
 
