@@ -442,7 +442,7 @@ def extend_map(before: World, world: World, footprint: Footprint) -> ClearanceMa
     """
     grown = ClearanceMap(world, footprint)
     grown.adopt(clearance_map_for(before, footprint), world.obstacles[len(before.obstacles) :])
-    _maps.setdefault(world, {})[footprint] = grown
+    _maps.of_worlds.setdefault(world, {})[footprint] = grown
     return grown
 
 
