@@ -230,7 +230,8 @@ class ClearanceMap:
         children: see :class:`MapView`; replaced when the map grows.
         clearances: see :class:`MapView`; replaced when the map grows.
         frame: the other numbers of the view, shape (FRAME_SIZE,).
-        answers: FCL's answers of the present extension, rows of (x, y, theta, margin), shape (n, 4).
+        answers: FCL's answers of the present extension, rows of (x, y, theta, margin) and a number
+            of :func:`cbrrt_ompl.extension.find_answer`'s, shape (n, 5).
         exact_queries: states that FCL had to decide with the real footprint.
     """
 
@@ -257,7 +258,7 @@ class ClearanceMap:
         discs = disc_tree(footprint, MITRE_LIMIT * CONTACT_TOLERANCE)
         root = 2 * len(discs) if enabled else 0
         self.frame = np.array([*bounds.min, *bounds.max, size, inner, outer, footprint.is_round, root], dtype=float)
-        self.answers: NDArray[np.float64] = np.empty((64, 4))
+        self.answers: NDArray[np.float64] = np.zeros((64, 5))
         self._margins: dict[tuple[float, float, float], float] = {}
         self._root, self._rows = root, root + 1 if enabled else 0
         self.children: NDArray[np.int32] = np.zeros(self._rows, dtype=np.int32)
@@ -326,9 +327,9 @@ class ClearanceMap:
         if self._refine(x, y, theta, ROOM) != UNDECIDED:
             return answered
         if answered == len(self.answers):
-            self.answers = np.concatenate([self.answers, np.empty_like(self.answers)])
+            self.answers = np.concatenate([self.answers, np.zeros_like(self.answers)])
         self.exact_queries += 1
-        self.answers[answered] = x, y, theta, self._margin(x, y, theta)
+        self.answers[answered, :4] = x, y, theta, self._margin(x, y, theta)
         return answered + 1
 
     def _margin(self, x: float, y: float, theta: float) -> float:

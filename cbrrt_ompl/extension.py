@@ -246,16 +246,24 @@ def advance(
 def find_answer(answers: NDArray[np.float64], answered: int, x: float, y: float, theta: float) -> float:
     """What FCL said about a pose: its margin [m], 0 in collision, -1 where it was not asked.
 
+    An extension that is repeated asks in the same order, so the search begins behind the row found last, which the last
+    number of the first row names.
+
     Args:
-        answers: rows of (x, y, theta, margin), shape (n, 4).
+        answers: rows of (x, y, theta, margin, row), shape (n, 5).
         answered: rows in use.
         x: position [m].
         y: position [m].
         theta: heading [rad].
     """
-    for i in range(answered):
+    i = int(answers[0, 4])
+    for _ in range(answered):
+        if i >= answered:
+            i = 0
         if answers[i, 0] == x and answers[i, 1] == y and answers[i, 2] == theta:
+            answers[0, 4] = i + 1
             return answers[i, 3]
+        i += 1
     return -1.0
 
 
