@@ -327,7 +327,7 @@ def brake(
     Returns:
         The given state and one a step, shape (n, 5); the last one at rest, unless n is ``most_steps + 1``.
     """
-    states = np.empty((64, 5))
+    states: NDArray[np.float64] = np.empty((64, 5))
     n = 0
     while True:
         states[n, 0], states[n, 1], states[n, 2], states[n, 3], states[n, 4] = x, y, theta, v, omega

@@ -82,4 +82,4 @@ def test_architecture_names_every_module(repository: Path) -> None:
 
 
 def test_the_picture_is_small(repository: Path) -> None:
-    assert (repository / "docs" / "images" / "paper_case1.png").stat().st_size < 150_000
+    assert (repository / "docs" / "images" / "paper_case1.gif").stat().st_size < 400_000
