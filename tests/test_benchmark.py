@@ -103,9 +103,9 @@ time REAL
 FAKE_CASE = """
 import json, os, sys, time
 from dataclasses import replace
-from cbrrt_ompl.benchmark.case import Case, crash_log, _die_with_parent
+from cbrrt_ompl.benchmark.case import Case, crash_log, die_with_parent
 from cbrrt_ompl.benchmark.log import format_log
-_die_with_parent(int(sys.argv[2]))
+die_with_parent(int(sys.argv[2]))
 data = json.load(sys.stdin)
 case = Case(**{**data, "seeds": tuple(data["seeds"])})
 if case.planner == "est":
