@@ -1,0 +1,216 @@
+"""Laws of single kernels that other tests see only in what is built on them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cbrrt_ompl import clearance_map
+from cbrrt_ompl.clearance_map import COLLISION, ROOM, UNDECIDED, ClearanceMap, certify, certify_pose, find_leaf
+from cbrrt_ompl.disc_tree import disc_tree
+from cbrrt_ompl.kinematics import (
+    dynamic_step,
+    joint_ramp,
+    joint_ramp_time,
+    pure_limits,
+    saturate,
+    sine_cosine,
+    stopping_time,
+    unicycle_step,
+)
+from cbrrt_ompl.obstacles import Bounds, Box, Disc
+from cbrrt_ompl.robot import Footprint, Limits
+from cbrrt_ompl.world import World
+
+DT = 0.05
+sizes = st.floats(0.05, 5.0)
+shares = st.floats(0.0, 1.0)
+wheeled = st.builds(
+    Limits,
+    st.floats(-2.0, 0.0),
+    sizes,
+    st.floats(-4.0, -0.05),
+    sizes,
+    sizes,
+    sizes,
+    sizes,
+    st.one_of(sizes, st.just(math.inf)),
+    st.one_of(sizes, st.just(math.inf)),
+).filter(lambda limits: limits.has_wheel_limits)
+EITHER = Limits(-0.6, 1.0, -2.0, 3.0, 0.9, 2.5, wheel_separation=0.4, wheel_speed=0.5, wheel_acceleration=0.7)
+"""The wheels are what limits driving straight on and, to the left alone, turning on the spot."""
+
+LONG = Footprint.polygon([(-0.4, -0.1), (0.5, -0.1), (0.5, 0.1), (-0.4, 0.1)])
+
+
+class TestSineAndCosine:
+    @given(st.floats(-20.0, 20.0))
+    def test_they_are_those_of_the_library_to_rounding(self, angle: float) -> None:
+        assert sine_cosine(angle) == pytest.approx((math.sin(angle), math.cos(angle)), rel=0.0, abs=2.3e-16)
+
+    @pytest.mark.parametrize("quarters", range(-9, 10))
+    def test_every_quarter_turn_has_its_signs(self, quarters: int) -> None:
+        s, c = sine_cosine(0.5 * math.pi * quarters)
+        assert (round(s), round(c)) == ((0, 1, 0, -1)[quarters % 4], (1, 0, -1, 0)[quarters % 4])
+
+
+class TestPureLimits:
+    def test_by_hand(self) -> None:
+        found = pure_limits(EITHER)
+        assert found == pytest.approx((-0.5, 0.5, -2.0, 2.5, 0.7, 2.5, 0.4, 0.5, 0.7), rel=1e-14)
+        assert pure_limits(EITHER._replace(angular_acceleration=9.0)).angular_acceleration == pytest.approx(3.5)
+
+    def test_a_robot_without_wheel_limits_has_its_own(self) -> None:
+        limits = Limits(-0.3, 1.0, -0.4, 0.6, 0.9, 2.5, wheel_separation=0.4)
+        assert pure_limits(limits) == limits
+
+    @given(wheeled)
+    def test_the_wheels_can_drive_straight_on_and_turn_on_the_spot_as_fast(self, limits: Limits) -> None:
+        pure = pure_limits(limits)
+        for command in [(pure.v_min, 0.0), (pure.v_max, 0.0), (0.0, pure.omega_min), (0.0, pure.omega_max)]:
+            assert saturate(*command, limits) == command
+
+    @given(wheeled)
+    def test_nothing_faster_would_do(self, limits: Limits) -> None:
+        pure, arm = pure_limits(limits), 0.5 * limits.wheel_separation
+        assert pure.v_max == min(limits.v_max, limits.wheel_speed)
+        assert pure.v_min == max(limits.v_min, -limits.wheel_speed)
+        assert pure.omega_max == pytest.approx(min(limits.omega_max, limits.wheel_speed / arm), rel=1e-14)
+        assert pure.omega_min == pytest.approx(max(limits.omega_min, -limits.wheel_speed / arm), rel=1e-14)
+
+    @given(wheeled)
+    def test_a_pure_ramp_takes_a_second_to_its_acceleration(self, limits: Limits) -> None:
+        pure = pure_limits(limits)
+        assert joint_ramp_time(pure.acceleration, 0.0, limits) == pytest.approx(1.0, rel=1e-14)
+        assert joint_ramp_time(0.0, -pure.angular_acceleration, limits) == pytest.approx(1.0, rel=1e-14)
+
+
+class TestStoppingTime:
+    @given(wheeled, shares, shares)
+    def test_a_robot_with_wheel_limits_brakes_for_so_long(self, limits: Limits, v_share: float, turn: float) -> None:
+        v = limits.v_min + v_share * (limits.v_max - limits.v_min)
+        omega = limits.omega_min + turn * (limits.omega_max - limits.omega_min)
+        expected = stopping_time(v, omega, limits)
+        dt = expected / 7.5 if expected > 0.0 else DT
+        velocity = v, omega
+        for _ in range(7 if expected > 0.0 else 0):
+            velocity = joint_ramp(*velocity, 0.0, 0.0, limits, dt)
+            assert velocity != (0.0, 0.0)
+        assert joint_ramp(*velocity, 0.0, 0.0, limits, dt) == (0.0, 0.0)
+
+    def test_without_wheel_limits_turning_does_not_count(self) -> None:
+        limits = Limits(-2.0, 2.0, -3.0, 3.0, 0.5, 0.1, wheel_separation=0.4)
+        assert stopping_time(-1.5, 3.0, limits) == 3.0
+        assert stopping_time(0.0, 3.0, limits) == 0.0
+
+
+class TestJointSteps:
+    @pytest.mark.parametrize(
+        ("command", "time"),
+        [((0.3, 0.0), 0.3 / 0.7), ((-0.3, 0.5), 0.4 / 0.7), ((0.0, -1.5), 0.6), ((0.05, -1.0), 0.4)],
+    )
+    def test_ramp_times_by_hand(self, command: tuple[float, float], time: float) -> None:
+        assert joint_ramp_time(*command, EITHER) == pytest.approx(time, rel=1e-14)
+
+    @given(wheeled, shares, shares, st.floats(-2.0, 2.0), st.floats(-3.0, 3.0))
+    def test_a_dynamic_step_of_a_robot_with_wheel_limits_ramps_both_velocities_jointly(
+        self, limits: Limits, v_share: float, turn: float, v_command: float, omega_command: float
+    ) -> None:
+        v, omega = 2.0 * v_share - 1.0, 2.0 * turn - 1.0
+        state = dynamic_step(0.3, -0.2, 0.7, v, omega, (v_command, omega_command), limits, DT)
+        assert state[3:] == joint_ramp(v, omega, v_command, omega_command, limits, DT)
+        assert state[:3] == unicycle_step(0.3, -0.2, 0.7, v, omega, *state[3:], DT)
+
+    def test_a_command_within_rounding_of_the_reach_is_reached(self) -> None:
+        """Else a rest of 1e-17 would take a step of its own."""
+        just = np.nextafter(EITHER.wheel_acceleration * DT, 1.0)
+        assert joint_ramp(0.0, 0.0, float(just), 0.0, EITHER, DT) == (just, 0.0)
+        beyond = EITHER.wheel_acceleration * DT * (1.0 + 1e-10)
+        assert joint_ramp(0.0, 0.0, beyond, 0.0, EITHER, DT)[0] < beyond
+
+
+class TestDiscTree:
+    def test_a_rectangle_is_quartered_twice_into_the_smallest_discs(self) -> None:
+        growth = 1e-3
+        tree = disc_tree(Footprint.polygon([(-0.2, -0.1), (0.6, -0.1), (0.6, 0.3), (-0.2, 0.3)]), growth)
+        expected = []
+        for x, y in [(0.0, 0.0), (0.4, 0.0), (0.0, 0.2), (0.4, 0.2)]:
+            expected.append((x, y, math.hypot(0.2, 0.1) + growth, 0.1, len(expected) + 5))
+            for dx, dy in [(-0.1, -0.05), (0.1, -0.05), (-0.1, 0.05), (0.1, 0.05)]:
+                wall = min(x + dx + 0.2, 0.6 - x - dx, y + dy + 0.1, 0.3 - y - dy)
+                expected.append((x + dx, y + dy, math.hypot(0.1, 0.05) + growth, wall, len(expected) + 1))
+        assert tree == pytest.approx(np.array(expected), abs=1e-11)
+
+
+class TestClearanceMap:
+    @pytest.fixture
+    def grown(self) -> ClearanceMap:
+        """A map that has split its cells about a thousand poses of a long robot."""
+        world = World(Bounds((-3.0, -1.5), (3.0, 1.5)), [Box((0.2, -1.0), (0.5, 1.0)), Disc((-1.0, 0.5), 0.3)])
+        grown = ClearanceMap(world, LONG)
+        for pose in np.random.default_rng(3).uniform((-2.9, -1.4, -3.0), (2.9, 1.4, 3.0), (1000, 3)).tolist():
+            grown.collides(*pose)
+        return grown
+
+    def test_the_leaf_of_a_position_holds_it_and_was_measured_in_its_centre(self, grown: ClearanceMap) -> None:
+        view, sides = grown.view, set()
+        for x, y in np.random.default_rng(4).uniform((-3.0, -1.5), (3.0, 1.5), (2000, 2)).tolist():
+            leaf, x_centre, y_centre, side = find_leaf(view, x, y)
+            assert view.children[leaf] == 0
+            assert abs(x - x_centre) <= 0.5 * side and abs(y - y_centre) <= 0.5 * side
+            assert view.clearances[leaf, :2].tolist() == [x_centre, y_centre]
+            sides.add(side)
+        assert max(sides) / min(sides) >= 16.0
+
+    def test_the_middle_of_a_cell_belongs_to_its_upper_right_part(self, grown: ClearanceMap) -> None:
+        assert find_leaf(grown.view, 0.0, 1.5)[1:3] > (0.0, 1.5)
+
+    def test_the_parts_of_a_long_robot_are_certified_where_the_whole_cannot_be(self) -> None:
+        """No disc about the whole robot fits into the corridor; those about its parts do, so FCL need not be asked."""
+        world = World(Bounds((-3.0, -1.0), (3.0, 1.0)), [Box((-3.0, y), (3.0, y + 0.7)) for y in (-0.95, 0.25)])
+        corridor = ClearanceMap(world, LONG)
+        for x, y, theta in np.random.default_rng(5).uniform((-2.4, -0.02, -0.02), (2.4, 0.02, 0.02), (200, 3)).tolist():
+            assert not corridor.collides(x, y, theta)
+            assert certify(corridor.view, x, y) == UNDECIDED
+            margin, is_of_the_origin = certify_pose(corridor.view, x, y, theta)
+            assert margin > 0.0 and not is_of_the_origin
+        assert corridor.exact_queries == 0
+
+    def test_a_part_inside_an_obstacle_is_certified_as_a_collision(self) -> None:
+        world = World(Bounds((-3.0, -1.0), (3.0, 1.0)), [Box((0.2, -0.5), (1.0, 0.5))])
+        beside = ClearanceMap(world, LONG)
+        assert beside.collides(0.0, 0.0, 0.0)
+        assert certify(beside.view, 0.0, 0.0) == UNDECIDED
+        assert certify_pose(beside.view, 0.0, 0.0, 0.0) == (COLLISION, False)
+        assert beside.exact_queries == 0
+
+    def test_what_a_kernel_asked_is_kept_for_the_position_of_a_round_robot(self) -> None:
+        """An answer takes a row only where the map that was measured again at the position still leaves no room."""
+        world = World(Bounds((-1.0, -1.0), (1.0, 1.0)), [Box((0.3, -1.0), (1.0, 1.0))])
+        kept = ClearanceMap(world, Footprint.disc(0.2))
+        x = 0.1 - 0.9 * ROOM
+        assert kept.answer(0, x, 0.0, 0.0) == 1
+        assert kept.answers[0, :3].tolist() == [x, 0.0, 0.0]
+        assert kept.answers[0, 3] == pytest.approx(0.9 * ROOM, abs=1e-5)
+        assert certify(kept.view, x, 0.0) == kept.answers[0, 3]
+        cells = kept.cells
+        assert kept.answer(0, x, 0.0, 1.0) == 1
+        assert kept.cells == cells
+
+    def test_room_enough_takes_no_row_of_answers_and_less_does(self) -> None:
+        world = World(Bounds((-1.0, -1.0), (1.0, 1.0)), [Box((0.3, -1.0), (1.0, 1.0))])
+        for room, rows in ((1.5 * ROOM, 0), (0.5 * ROOM, 1)):
+            assert ClearanceMap(world, Footprint.point()).answer(0, 0.3 - room, 0.1, 0.0) == rows
+
+    def test_the_answers_about_poses_stay_within_their_bound(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(clearance_map, "MAX_MARGINS", 3)
+        world = World(Bounds((-1.0, -1.0), (1.0, 1.0)))
+        bounded = ClearanceMap(world, LONG, enabled=False)
+        for i in range(8):
+            assert bounded.answer(0, 0.01 * i, 0.0, 0.0) == 1
+            assert bounded.answers[0, 3] == bounded.checker.margin(0.01 * i, 0.0, 0.0)
+        assert 1 <= len(bounded._margins) <= 3
