@@ -3,10 +3,11 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help demo test docs clean
+.PHONY: help demo test coverage docs clean
 help:
 	@echo "make demo   install into $(VENV) and plan both scenes of the paper and measure it again, in short"
 	@echo "make test   install into $(VENV) and run every check: ruff, mypy, import-linter, pytest"
+	@echo "make coverage   run pytest, and again with kernels in plain Python, and list the lines that never ran"
 	@echo "make docs   install into $(VENV) and build the pages of docs/ into site/, without a warning"
 	@echo "make clean  remove $(VENV), demo/, site/ and all caches"
 
@@ -19,6 +20,19 @@ test: $(VENV)/test.stamp
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python -m pytest -n 2
+
+# Lines of compiled kernels are not seen: tests of the kernels run again without the compiler, but for those that would
+# take minutes then.
+KERNEL_TESTS := control_laws kernel_laws kinematics manoeuvres disc_tree extension nearest replay wheels occupancy \
+	report_sections
+TOO_SLOW := thousand or millimetre or MapHolds or BrakeSafe or brake_safe_tree or position_alone or passes_through
+coverage: $(VENV)/test.stamp
+	$(BIN)/coverage erase
+	$(BIN)/coverage run -m pytest -n 2
+	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest --hypothesis-profile few -m 'not slow' -k 'not ($(TOO_SLOW))' \
+		$(KERNEL_TESTS:%=tests/test_%.py)
+	$(BIN)/coverage combine --quiet
+	$(BIN)/coverage report
 
 docs: $(VENV)/docs.stamp
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict

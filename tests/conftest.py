@@ -8,6 +8,7 @@ import pytest
 from hypothesis import settings
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
+settings.register_profile("few", settings.get_profile("repeatable"), max_examples=5)
 settings.load_profile("repeatable")
 
 

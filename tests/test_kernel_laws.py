@@ -10,8 +10,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cbrrt_ompl import clearance_map
-from cbrrt_ompl.clearance_map import COLLISION, ROOM, UNDECIDED, ClearanceMap, certify, certify_pose, find_leaf
+from cbrrt_ompl.clearance_map import (
+    COLLISION,
+    ROOM,
+    SMALLEST_CELL,
+    UNDECIDED,
+    ClearanceMap,
+    certify,
+    certify_pose,
+    find_leaf,
+)
+from cbrrt_ompl.compiled.search import Search
 from cbrrt_ompl.disc_tree import disc_tree
+from cbrrt_ompl.extension import OPEN_LOOP, pack_model
 from cbrrt_ompl.kinematics import (
     dynamic_step,
     joint_ramp,
@@ -22,8 +33,10 @@ from cbrrt_ompl.kinematics import (
     stopping_time,
     unicycle_step,
 )
+from cbrrt_ompl.manoeuvres import BRAKE, FORWARD, REVERSE, approach_command, has_ended, is_manoeuvre, most_steps
 from cbrrt_ompl.obstacles import Bounds, Box, Disc
-from cbrrt_ompl.robot import Footprint, Limits
+from cbrrt_ompl.robot import Footprint, Limits, Robot
+from cbrrt_ompl.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.world import World
 
 DT = 0.05
@@ -145,6 +158,12 @@ class TestDiscTree:
                 expected.append((x + dx, y + dy, math.hypot(0.1, 0.05) + growth, wall, len(expected) + 1))
         assert tree == pytest.approx(np.array(expected), abs=1e-11)
 
+    def test_discs_that_are_not_grown_hold_their_corners_to_the_last_bit(self) -> None:
+        corners = np.array([(-0.2, -0.1), (0.6, -0.1), (0.6, 0.3), (-0.2, 0.3)])
+        tree = disc_tree(Footprint.polygon(corners), 0.0)
+        for corner in corners:
+            assert (np.hypot(*(tree[:, :2] - corner).T) < tree[:, 2]).sum() == 2  # its quarter, and the quarter of that
+
 
 class TestClearanceMap:
     @pytest.fixture
@@ -158,6 +177,7 @@ class TestClearanceMap:
 
     def test_the_leaf_of_a_position_holds_it_and_was_measured_in_its_centre(self, grown: ClearanceMap) -> None:
         view, sides = grown.view, set()
+        assert len(view.children) == len(view.clearances) >= grown.cells
         for x, y in np.random.default_rng(4).uniform((-3.0, -1.5), (3.0, 1.5), (2000, 2)).tolist():
             leaf, x_centre, y_centre, side = find_leaf(view, x, y)
             assert view.children[leaf] == 0
@@ -165,6 +185,24 @@ class TestClearanceMap:
             assert view.clearances[leaf, :2].tolist() == [x_centre, y_centre]
             sides.add(side)
         assert max(sides) / min(sides) >= 16.0
+
+    def test_a_new_map_was_measured_in_the_middle_of_a_square_on_its_lower_left_corner(self) -> None:
+        new = ClearanceMap(World(Bounds((-3.0, -1.5), (4.0, 1.5))), LONG)
+        assert find_leaf(new.view, 1.0, 1.0) == (0, 0.5, 2.0, 7.0)
+        assert new.clearances.shape == (1, 3)
+        assert new.clearances[0, :2].tolist() == [0.5, 2.0]
+
+    def test_deep_inside_an_obstacle_the_heading_makes_no_difference(self) -> None:
+        deep = ClearanceMap(World(Bounds((-3.0, -3.0), (3.0, 3.0)), [Box((-1.0, -1.0), (1.0, 1.0))]), LONG)
+        assert deep.collides(0.0, 0.0, 0.3)
+        assert certify(deep.view, 0.0, 0.0) == COLLISION
+
+    def test_no_cell_is_split_for_a_disc_that_a_surface_cuts(self) -> None:
+        """Such a disc cannot be decided in cells of any size; the parts of the robot can, in large ones."""
+        beside = ClearanceMap(World(Bounds((-2.0, -2.0), (2.0, 2.0)), [Box((-2.0, 0.4), (2.0, 2.0))]), LONG)
+        assert not beside.collides(0.1, 0.0, 0.0)
+        assert certify(beside.view, 0.1, 0.0) == UNDECIDED
+        assert 1 < beside.cells < 1 + 4 * math.log2(4.0 / SMALLEST_CELL)
 
     def test_the_middle_of_a_cell_belongs_to_its_upper_right_part(self, grown: ClearanceMap) -> None:
         assert find_leaf(grown.view, 0.0, 1.5)[1:3] > (0.0, 1.5)
@@ -214,3 +252,54 @@ class TestClearanceMap:
             assert bounded.answer(0, 0.01 * i, 0.0, 0.0) == 1
             assert bounded.answers[0, 3] == bounded.checker.margin(0.01 * i, 0.0, 0.0)
         assert 1 <= len(bounded._margins) <= 3
+
+
+class TestManoeuvres:
+    @pytest.mark.parametrize("manoeuvre", [FORWARD, REVERSE, BRAKE])
+    def test_no_heading_is_taken_for_a_manoeuvre_nor_one_for_another(self, manoeuvre: float) -> None:
+        assert is_manoeuvre((0.0, 0.0, manoeuvre))
+        assert not any(is_manoeuvre((1.0, 1.0, theta)) for theta in (-math.pi, 0.0, math.pi, 2.0 * math.pi))
+        assert [FORWARD, REVERSE, BRAKE].count(manoeuvre) == 1
+
+    @pytest.mark.parametrize(
+        "limits",
+        [
+            Limits(-2.0, 2.0, -3.0, 3.0, 0.05, 9.0),
+            Limits(-0.1, 0.1, -2.0, 2.0, 9.0, 0.05),
+            Limits(-1.0, 1.0, -0.02, 3.0, 9.0, 9.0),
+            Limits(-1.0, 0.01, -3.0, 3.0, 9.0, 9.0),
+            Limits(-0.01, 1.0, -3.0, 3.0, 9.0, 9.0),
+        ],
+        ids=["slow to brake", "slow to end a turn", "slow to the right", "slow ahead", "slow backwards"],
+    )
+    @pytest.mark.parametrize("manoeuvre", [FORWARD, REVERSE, BRAKE])
+    def test_even_slow_robots_have_steps_enough(self, limits: Limits, manoeuvre: float) -> None:
+        dt, aim = 0.1, (4.0, -0.5, -2.0)
+        state = (0.0, 0.0, 0.0, limits.v_max, limits.omega_max)
+        for _ in range(most_steps(manoeuvre, math.hypot(*aim[:2]), limits, dt)):
+            x, y, theta, v, omega = state
+            if manoeuvre == BRAKE:
+                state = dynamic_step(*state, (0.0, 0.0), limits, dt)
+            else:
+                after = approach_command(state, aim, True, manoeuvre == REVERSE, False, limits, dt)
+                state = (*unicycle_step(x, y, theta, v, omega, *after, dt), *after)
+            if has_ended(manoeuvre, state, aim, True):
+                break
+        assert has_ended(manoeuvre, state, aim, True)
+
+
+class TestBraking:
+    @pytest.mark.parametrize("cut", ["discard", "keep"])
+    def test_every_node_of_a_small_tree_can_brake(self, cut: str) -> None:
+        """From full speed, 0.83 m from a wall, this robot could not."""
+        world = World(Bounds((-2.0, -2.0), (2.0, 2.0)), [Box((0.8, -2.0), (1.0, 1.5))])
+        planning = PlanningSettings(brake_safe=True, cut_extension=cut)
+        model = pack_model(OPEN_LOOP, Robot(), Goal(1.7, -1.7, tolerance=0.1), planning)
+        search = Search(model, ClearanceMap(world, Footprint.point()), [State(0.0, 0.0)], seed=1)
+        search.run(lambda _: False, 120)
+        states = search.edges()[0]
+        assert len(states) > 20
+        for state in states.tolist():
+            while state[3] != 0.0 or state[4] != 0.0:
+                assert not world.collides(Footprint.point(), state[:3])
+                state = dynamic_step(*state, (0.0, 0.0), Limits(), DT)

@@ -603,6 +603,7 @@ def test_a_dynobench_robot_may_be_kept_from_reversing(tmp_path: Path) -> None:
         ("type: box", "type: sphere", "problem.yaml: environment.obstacles[0].type: got 'sphere', expected one of box"),
         ("max: [6, 4]", "max: [0, 4]", "problem.yaml: environment"),
         ("start: [1, 2, 0, 0, 0]", "start: [1, 2, 0]", "problem.yaml: robots[0].start: got [1, 2, 0]"),
+        ("robots:", "robots: []\nothers:", "problem.yaml: robots: got [], expected a list of one robot"),
         ("1.55, 0, 0]", "1.55, 0.5, 0]", "problem.yaml: robots[0].goal: got [5.2, 3, 1.55, 0.5, 0]"),
     ],
 )
