@@ -218,6 +218,14 @@ class TestClearanceMap:
             assert margin > 0.0 and not is_of_the_origin
         assert corridor.exact_queries == 0
 
+    def test_no_margin_reaches_further_than_the_origin_from_the_bounds(self) -> None:
+        """The footprint is further from them than its origin, which may not leave them either."""
+        footprint = Footprint.polygon([(0.1, -0.1), (0.3, -0.1), (0.3, 0.1), (0.1, 0.1)])
+        beside = ClearanceMap(World(Bounds((-1.0, -1.0), (1.0, 1.0))), footprint)
+        assert not beside.collides(-0.95, 0.0, 0.0)
+        margin, is_of_the_origin = certify_pose(beside.view, -0.95, 0.0, 0.0)
+        assert 0.0 < margin <= 0.05 + 1e-12 and not is_of_the_origin
+
     def test_a_part_inside_an_obstacle_is_certified_as_a_collision(self) -> None:
         world = World(Bounds((-3.0, -1.0), (3.0, 1.0)), [Box((0.2, -0.5), (1.0, 0.5))])
         beside = ClearanceMap(world, LONG)
