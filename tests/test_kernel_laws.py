@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from cbrrt_ompl import clearance_map
 from cbrrt_ompl.clearance_map import (
     COLLISION,
+    GOOD_MARGIN,
     ROOM,
     SMALLEST_CELL,
     UNDECIDED,
@@ -216,6 +217,13 @@ class TestClearanceMap:
             assert certify(corridor.view, x, y) == UNDECIDED
             margin, is_of_the_origin = certify_pose(corridor.view, x, y, theta)
             assert margin > 0.0 and not is_of_the_origin
+        assert corridor.exact_queries == 0
+
+    def test_a_finest_part_is_certified_with_a_small_margin_too(self) -> None:
+        walls = [Box((-3.0, y), (3.0, y + 0.5)) for y in (-0.685, 0.185)]  # 1.2 cm beside the finest discs
+        corridor = ClearanceMap(World(Bounds((-3.0, -1.0), (3.0, 1.0)), walls), LONG)
+        assert not corridor.collides(0.0, 0.0, 0.0)
+        assert 0.0 < certify_pose(corridor.view, 0.0, 0.0, 0.0)[0] < GOOD_MARGIN
         assert corridor.exact_queries == 0
 
     def test_no_margin_reaches_further_than_the_origin_from_the_bounds(self) -> None:
