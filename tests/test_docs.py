@@ -126,7 +126,9 @@ def test_the_pages_request_nothing_from_elsewhere(repository: Path) -> None:
 def test_the_commands_on_the_pages_exist(docs: Path) -> None:
     text = "\n".join(path.read_text(encoding="utf-8").replace("\\\n", " ") for path in docs.glob("*.md"))
     lines = [line.strip() for block in blocks(text, "console") for line in block.splitlines()]
-    commands = [shlex.split(line.removeprefix("$ "), comments=True)[1:] for line in lines if line.startswith("$ cbrrt ")]
+    commands = [
+        shlex.split(line.removeprefix("$ "), comments=True)[1:] for line in lines if line.startswith("$ cbrrt ")
+    ]
     assert len(commands) > 5
     for arguments in commands:
         assert callable(build_parser().parse_args(arguments).run)

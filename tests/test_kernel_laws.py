@@ -189,20 +189,21 @@ class TestClearanceMap:
 
     def test_a_new_map_was_measured_in_the_middle_of_a_square_on_its_lower_left_corner(self) -> None:
         new = ClearanceMap(World(Bounds((-3.0, -1.5), (4.0, 1.5))), LONG)
-        assert find_leaf(new.view, 1.0, 1.0) == (0, 0.5, 2.0, 7.0)
-        assert new.clearances.shape == (1, 3)
-        assert new.clearances[0, :2].tolist() == [0.5, 2.0]
+        root, *square = find_leaf(new.view, 1.0, 1.0)
+        assert new.cells == 1
+        assert square == [0.5, 2.0, 7.0]
+        assert new.clearances[root, :2].tolist() == [0.5, 2.0]
 
     def test_deep_inside_an_obstacle_the_heading_makes_no_difference(self) -> None:
         deep = ClearanceMap(World(Bounds((-3.0, -3.0), (3.0, 3.0)), [Box((-1.0, -1.0), (1.0, 1.0))]), LONG)
         assert deep.collides(0.0, 0.0, 0.3)
-        assert certify(deep.view, 0.0, 0.0) == COLLISION
+        assert certify(deep.view, 0.0, 0.0, 0.0) == COLLISION
 
     def test_no_cell_is_split_for_a_disc_that_a_surface_cuts(self) -> None:
         """Such a disc cannot be decided in cells of any size; the parts of the robot can, in large ones."""
         beside = ClearanceMap(World(Bounds((-2.0, -2.0), (2.0, 2.0)), [Box((-2.0, 0.4), (2.0, 2.0))]), LONG)
-        assert not beside.collides(0.1, 0.0, 0.0)
-        assert certify(beside.view, 0.1, 0.0) == UNDECIDED
+        assert beside.answer(0, 0.1, 0.0, 0.0) == 0
+        assert certify(beside.view, 0.1, 0.0, ROOM) == UNDECIDED
         assert 1 < beside.cells < 1 + 4 * math.log2(4.0 / SMALLEST_CELL)
 
     def test_the_middle_of_a_cell_belongs_to_its_upper_right_part(self, grown: ClearanceMap) -> None:
@@ -213,52 +214,55 @@ class TestClearanceMap:
         world = World(Bounds((-3.0, -1.0), (3.0, 1.0)), [Box((-3.0, y), (3.0, y + 0.7)) for y in (-0.95, 0.25)])
         corridor = ClearanceMap(world, LONG)
         for x, y, theta in np.random.default_rng(5).uniform((-2.4, -0.02, -0.02), (2.4, 0.02, 0.02), (200, 3)).tolist():
-            assert not corridor.collides(x, y, theta)
-            assert certify(corridor.view, x, y) == UNDECIDED
-            margin, is_of_the_origin = certify_pose(corridor.view, x, y, theta)
+            assert corridor.answer(0, x, y, theta) == 0
+            assert certify(corridor.view, x, y, ROOM) == UNDECIDED
+            margin, is_of_the_origin = certify_pose(corridor.view, x, y, theta, ROOM)
             assert margin > 0.0 and not is_of_the_origin
         assert corridor.exact_queries == 0
 
     def test_a_finest_part_is_certified_with_a_small_margin_too(self) -> None:
-        walls = [Box((-3.0, y), (3.0, y + 0.5)) for y in (-0.685, 0.185)]  # 1.2 cm beside the finest discs
+        walls = [Box((-3.0, y), (3.0, y + 0.5)) for y in (-0.705, 0.205)]  # 1.5 cm beside the finest discs
         corridor = ClearanceMap(World(Bounds((-3.0, -1.0), (3.0, 1.0)), walls), LONG)
-        assert not corridor.collides(0.0, 0.0, 0.0)
-        assert 0.0 < certify_pose(corridor.view, 0.0, 0.0, 0.0)[0] < GOOD_MARGIN
+        assert corridor.answer(0, 0.0, 0.0, 0.0) == 0
+        assert 0.0 < certify_pose(corridor.view, 0.0, 0.0, 0.0, ROOM)[0] < GOOD_MARGIN
         assert corridor.exact_queries == 0
 
     def test_no_margin_reaches_further_than_the_origin_from_the_bounds(self) -> None:
         """The footprint is further from them than its origin, which may not leave them either."""
         footprint = Footprint.polygon([(0.1, -0.1), (0.3, -0.1), (0.3, 0.1), (0.1, 0.1)])
         beside = ClearanceMap(World(Bounds((-1.0, -1.0), (1.0, 1.0))), footprint)
-        assert not beside.collides(-0.95, 0.0, 0.0)
-        margin, is_of_the_origin = certify_pose(beside.view, -0.95, 0.0, 0.0)
+        assert beside.answer(0, -0.95, 0.0, 0.0) == 0
+        margin, is_of_the_origin = certify_pose(beside.view, -0.95, 0.0, 0.0, ROOM)
         assert 0.0 < margin <= 0.05 + 1e-12 and not is_of_the_origin
 
     def test_a_part_inside_an_obstacle_is_certified_as_a_collision(self) -> None:
         world = World(Bounds((-3.0, -1.0), (3.0, 1.0)), [Box((0.2, -0.5), (1.0, 0.5))])
         beside = ClearanceMap(world, LONG)
-        assert beside.collides(0.0, 0.0, 0.0)
-        assert certify(beside.view, 0.0, 0.0) == UNDECIDED
-        assert certify_pose(beside.view, 0.0, 0.0, 0.0) == (COLLISION, False)
+        assert beside.answer(0, 0.0, 0.0, 0.0) == 0
+        assert certify(beside.view, 0.0, 0.0, ROOM) == UNDECIDED
+        assert certify_pose(beside.view, 0.0, 0.0, 0.0, ROOM) == (COLLISION, False)
         assert beside.exact_queries == 0
 
     def test_what_a_kernel_asked_is_kept_for_the_position_of_a_round_robot(self) -> None:
-        """An answer takes a row only where the map that was measured again at the position still leaves no room."""
+        """The map is measured again at the position, so that the question is decided when it comes again."""
         world = World(Bounds((-1.0, -1.0), (1.0, 1.0)), [Box((0.3, -1.0), (1.0, 1.0))])
         kept = ClearanceMap(world, Footprint.disc(0.2))
         x = 0.1 - 0.9 * ROOM
         assert kept.answer(0, x, 0.0, 0.0) == 1
         assert kept.answers[0, :3].tolist() == [x, 0.0, 0.0]
         assert kept.answers[0, 3] == pytest.approx(0.9 * ROOM, abs=1e-5)
-        assert certify(kept.view, x, 0.0) == kept.answers[0, 3]
+        assert certify(kept.view, x, 0.0, 0.0) == kept.answers[0, 3]
         cells = kept.cells
-        assert kept.answer(0, x, 0.0, 1.0) == 1
+        assert kept.answer(0, x, 0.0, 1.0) == 0
         assert kept.cells == cells
 
-    def test_room_enough_takes_no_row_of_answers_and_less_does(self) -> None:
+    @pytest.mark.parametrize("share", [0.5, 1.5])
+    def test_a_position_is_certified_by_whether_it_has_room(self, share: float) -> None:
         world = World(Bounds((-1.0, -1.0), (1.0, 1.0)), [Box((0.3, -1.0), (1.0, 1.0))])
-        for room, rows in ((1.5 * ROOM, 0), (0.5 * ROOM, 1)):
-            assert ClearanceMap(world, Footprint.point()).answer(0, 0.3 - room, 0.1, 0.0) == rows
+        near, x = ClearanceMap(world, Footprint.point()), 0.3 - share * ROOM
+        near.answer(0, x, 0.1, 0.0)
+        certificate = certify(near.view, x, 0.1, ROOM)
+        assert certificate == COLLISION if share < 1.0 else 0.0 < certificate <= 0.5 * ROOM
 
     def test_the_answers_about_poses_stay_within_their_bound(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(clearance_map, "MAX_MARGINS", 3)
