@@ -11,7 +11,13 @@ from nbclient import NotebookClient
 
 FOLDER = Path(__file__).resolve().parent.parent / "notebooks"
 NOTEBOOKS = sorted(path.stem for path in FOLDER.glob("*.ipynb"))
-FIGURES = {"1_first_plan": 4, "2_how_a_tree_grows": 5, "3_own_map_and_robot": 5, "4_benchmark": 2, "5_half_known_world": 3}
+FIGURES = {
+    "1_first_plan": 4,
+    "2_how_a_tree_grows": 5,
+    "3_own_map_and_robot": 5,
+    "4_benchmark": 2,
+    "5_half_known_world": 3,
+}
 """Pictures that a notebook shows at least; those of sliders are theirs and not counted."""
 
 
