@@ -182,6 +182,13 @@ class Footprint:
         return float(shapely.distance(shape.exterior, origin)) if shape.contains(origin) else 0.0
 
     @property
+    def distance_from_origin(self) -> float:
+        """Distance of the nearest point of the footprint from the robot's origin [m]."""
+        if self.vertices is None:
+            return 0.0
+        return float(shapely.distance(shapely.Polygon(self.vertices), shapely.Point(0.0, 0.0)))
+
+    @property
     def circumscribed_radius(self) -> float:
         """Radius of the smallest disc about the robot's origin that holds the footprint [m]."""
         if self.vertices is None:

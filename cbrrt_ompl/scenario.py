@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from cbrrt_ompl.errors import MISSING, InputError, Problem, ScenarioError
+from cbrrt_ompl.errors import MISSING, InputError, Problem, Remark, ScenarioError
 from cbrrt_ompl.files import as_path, write_file
 from cbrrt_ompl.robot import A_NUMBER, LARGEST, Limits, Robot
 from cbrrt_ompl.scenario_file import MapSource, read_parts, scenario_data
@@ -187,6 +187,8 @@ def find_problems(parts: Mapping[str, Any]) -> list[Problem]:
     robot, start, goal, planning = (parts.get(name) for name in ("robot", "start", "goal", "planning"))
     world = parts.get("world")
     found = list(_name_problems(parts["name"])) if "name" in parts else []
+    if robot is not None and world is not None:
+        found += _footprint_problems(robot, world)
     if start is not None:
         found += _start_problems(start, world, robot)
     if goal is not None and world is not None:
@@ -224,6 +226,14 @@ def _check_types(scenario: Scenario) -> None:
 def _name_problems(name: str) -> Iterator[Problem]:
     if not (isinstance(name, str) and name.strip() and name.isprintable()):
         yield Problem("name", name, "one line of text")
+
+
+def _footprint_problems(robot: Robot, world: World) -> Iterator[Problem]:
+    """Whether the footprint would stand behind the walls, which are as thick as the bounds are wide."""
+    distance, reach = robot.footprint.distance_from_origin, max(world.bounds.size)
+    if distance >= reach:
+        expected = f"a footprint nearer to the robot's origin than the bounds are wide ({reach:g} m)"
+        yield Problem("robot.footprint", Remark(f"one {distance:g} m away"), expected)
 
 
 def _start_problems(start: State, world: World | None, robot: Robot | None) -> Iterator[Problem]:
