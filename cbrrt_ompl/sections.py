@@ -16,6 +16,10 @@ from cbrrt_ompl.plain_yaml import key_path
 T = TypeVar("T")
 
 
+MAX_TEXT = 1000
+"""Longest text that is read, such as a name [characters]."""
+
+
 @dataclass
 class Report:
     """What was wrong with an input, in the order of reading.
@@ -158,9 +162,10 @@ def flag(value: object, path: str, report: Report) -> bool | None:
 
 def text(value: object, path: str, report: Report) -> str | None:
     """One line of text."""
-    if isinstance(value, str) and value.strip() and value.isprintable():
+    if isinstance(value, str) and value.strip() and value.isprintable() and len(value) <= MAX_TEXT:
         return value
-    report.add(path, value, "one line of text")
+    is_long = isinstance(value, str) and len(value) > MAX_TEXT
+    report.add(path, value, f"one line of text{f' of at most {MAX_TEXT} letters' if is_long else ''}")
     return None
 
 

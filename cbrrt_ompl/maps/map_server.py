@@ -91,7 +91,7 @@ def _image(data: Mapping[object, object], path: Path, problems: list[Problem]) -
             return image
     except (OSError, ValueError):
         pass
-    problems.append(Problem("image", name, f"a file that exists, looked for {image}"))
+    problems.append(Problem("image", name, f"a file that exists, looked for in {path.parent}"))
     return None
 
 
