@@ -147,7 +147,7 @@ def shifts_figure(outcomes: Outcomes, shifts: Sequence[float]) -> Figure:
                 ax.plot([], [], color=COLORS[twin], marker=MARKERS[twin], label=f"{NAMES[twin]}: no median, it fails")
                 continue
             x, median, low, high = np.array(shown).T
-            bars = [median - low, np.where(np.isinf(high), 10.0 * median, high) - median]
+            bars = np.array([median - low, np.where(np.isinf(high), 10.0 * median, high) - median]).tolist()
             ax.errorbar(
                 x, median, bars, color=COLORS[twin], marker=MARKERS[twin], markersize=5, capsize=3, linewidth=1.4,
                 label=NAMES[twin],
