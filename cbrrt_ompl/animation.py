@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-import uuid
+import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -34,6 +34,7 @@ from cbrrt_ompl.figures import (
     legend_above,
     obstacle_path,
 )
+from cbrrt_ompl.files import as_path, write_file
 from cbrrt_ompl.robot import Footprint
 from cbrrt_ompl.trajectory import Trajectory
 from cbrrt_ompl.tree import Tree
@@ -149,22 +150,17 @@ def save_animation(animation: FuncAnimation, path: str | os.PathLike[str]) -> No
     Raises:
         InputError: if the suffix is another one, ffmpeg is missing or the file cannot be written.
     """
-    path = Path(path)
+    path = as_path(path, InputError)
     check_animation_file(path)
-    target = path.resolve()
-    draft = target.with_name(f".{target.stem}.{uuid.uuid4().hex}{target.suffix}")
-    try:
-        if path.suffix.lower() == ".html":
-            with mpl.rc_context({"animation.embed_limit": 100.0}):
-                draft.write_text(animation.to_jshtml(fps=FRAMES_PER_SECOND, default_mode="loop"), encoding="utf-8")
-        else:
-            writer = _GifWriter if path.suffix.lower() == ".gif" else FFMpegWriter
-            animation.save(draft, writer=writer(fps=FRAMES_PER_SECOND), dpi=FIGURE_DPI)
-        os.replace(draft, target)
-    except OSError as error:
-        raise InputError(Problem("", error.strerror, "a file that can be written"), str(path)) from error
-    finally:
-        draft.unlink(missing_ok=True)
+    if path.suffix.lower() == ".html":
+        with mpl.rc_context({"animation.embed_limit": 100.0}):
+            write_file(path, animation.to_jshtml(fps=FRAMES_PER_SECOND, default_mode="loop"))
+        return
+    writer = _GifWriter if path.suffix.lower() == ".gif" else FFMpegWriter
+    with tempfile.TemporaryDirectory() as folder:
+        draft = Path(folder, f"draft{path.suffix.lower()}")
+        animation.save(draft, writer=writer(fps=FRAMES_PER_SECOND), dpi=FIGURE_DPI)
+        write_file(path, draft.read_bytes())
 
 
 def check_animation_file(path: Path) -> None:
