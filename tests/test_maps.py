@@ -678,3 +678,19 @@ def test_the_published_path_of_a_dynobench_problem_is_free_and_arrives(name: str
     touching = [scenario.world.collides(scenario.robot.footprint, state[:3]) for state in states]
     assert sum(touching) == 0
     assert scenario.goal.violations(type(scenario.start)(*states[-1])) == []
+
+
+@needs_real_maps
+@pytest.mark.parametrize("tolerance", [0.2, 0.03])
+@pytest.mark.parametrize("forward_only", [True, False], ids=["ahead", "both ways"])
+@pytest.mark.parametrize("name", ["bugtrap_0", "kink_0", "parallelpark_0"])
+def test_the_problems_of_dynobench_are_solved(name: str, forward_only: bool, tolerance: float) -> None:
+    from cbrrt_ompl import plan, verify
+
+    folder = REAL_MAPS / "dynobench"
+    files = folder / f"{name}.yaml", folder / "unicycle2_v0.yaml"
+    scenario = load_dynobench(*files, forward_only=forward_only, tolerance=tolerance)
+    result = plan(scenario, "cb-rrt-robust", seed=1, time_limit=60.0)
+    assert result.status == "solved"
+    assert result.trajectory is not None
+    assert verify(result.trajectory, scenario).violations == ()
