@@ -784,25 +784,24 @@ def _colored(text: str, color: str, stream: TextIO | None = None) -> str:
 
 
 def _seconds(text: str) -> float:
-    """A time limit from the command line [s]."""
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = math.nan
-    if not (math.isfinite(seconds) and seconds > 0.0):
-        raise argparse.ArgumentTypeError(f"got {text!r}, expected a number of seconds above 0")
-    return seconds
+    """A time from the command line [s]."""
+    return _above_zero(text, "seconds")
 
 
 def _metres(text: str) -> float:
     """A distance from the command line [m]."""
+    return _above_zero(text, "metres")
+
+
+def _above_zero(text: str, unit: str) -> float:
+    """A finite number above 0 from the command line."""
     try:
-        metres = float(text)
+        value = float(text)
     except ValueError:
-        metres = math.nan
-    if not (math.isfinite(metres) and metres > 0.0):
-        raise argparse.ArgumentTypeError(f"got {text!r}, expected a number of metres above 0")
-    return metres
+        value = math.nan
+    if not (math.isfinite(value) and value > 0.0):
+        raise argparse.ArgumentTypeError(f"got {text!r}, expected a number of {unit} above 0")
+    return value
 
 
 def _count(text: str) -> int:
