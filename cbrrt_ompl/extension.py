@@ -593,12 +593,14 @@ def drive_safely(
     steps, outcome, end, pose = roll_out(node, control, model, view, answers, answered, scratch)
     if not model.brake_safe or model.law == STEERING or outcome == ASK or (outcome == BLOCKED and not model.keep_cut):
         return steps, outcome, end, pose
-    if not model.keep_cut:  # the end is the likeliest to be refused
+    unchecked = steps
+    if not model.keep_cut:  # the end first: it is the likeliest to be refused
+        unchecked -= 1
         stops, asked = brake(end, model, view, answers, answered, scratch)
         if stops != EXTENDED:
             return 0, stops, node, asked
     x, y, theta, v, omega = node
-    for k in range(steps):
+    for k in range(unchecked):
         before = (x, y, theta, v, omega)
         x, y, theta, v, omega, _, _ = advance(x, y, theta, v, omega, control, model, model.dt)
         stops, asked = brake((x, y, theta, v, omega), model, view, answers, answered, scratch)
