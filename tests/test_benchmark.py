@@ -33,7 +33,7 @@ from cbrrt_ompl.benchmark.database import write_database
 from cbrrt_ompl.benchmark.experiment import Experiment
 from cbrrt_ompl.benchmark.local import run_locally
 from cbrrt_ompl.benchmark.log import Log, PlannerLog, format_log, merge_logs, parse_log, read_log
-from cbrrt_ompl.cli import build_parser, main
+from cbrrt_ompl.cli import main
 from cbrrt_ompl.errors import CbrrtError, InputError, SettingsError, UnknownPlannerError
 from cbrrt_ompl.extension import OPEN_LOOP, STEERING
 from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
@@ -671,14 +671,6 @@ def test_a_scheduler_that_is_not_there_is_one_line(
     outputs = ["--database", str(tmp_path / "a.db"), "--log-dir", str(tmp_path / "logs")]
     line = error_line(capsys, "bench", str(open_file), *outputs, "--scheduler", "tcp://127.0.0.1:9")
     assert line.startswith("no scheduler at tcp://127.0.0.1:9: ")
-
-
-def test_help_of_both_commands_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
-    for command in ("bench", "report"):
-        with pytest.raises(SystemExit):
-            main([command, "--help"])
-        example = capsys.readouterr().out.partition("example:\n  cbrrt ")[2].replace("\\\n", "").split()
-        assert build_parser().parse_args(example).run.__doc__ == f"``cbrrt {command}``."
 
 
 def test_progress_has_the_runs_and_the_time_left_on_a_terminal(

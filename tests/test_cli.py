@@ -13,13 +13,13 @@ from pathlib import Path
 import pytest
 
 from cbrrt_ompl import __version__, demo, figures, planning
-from cbrrt_ompl.cli import build_parser, main
+from cbrrt_ompl.cli import build_parser, main, program
 from cbrrt_ompl.errors import InputError, Problem
 from cbrrt_ompl.scenario import load_scenario
 from cbrrt_ompl.trajectory import Trajectory
 from cbrrt_ompl.verification import verify
 
-COMMANDS = ("plan", "verify", "show", "planners", "demo", "bench", "report", "reproduce", "completion")
+COMMANDS = [module.__name__.rpartition(".")[2] for module in program.COMMANDS]
 
 OPEN = """
 name: open
@@ -265,8 +265,8 @@ def test_the_examples_of_the_whole_command_exist(capsys: pytest.CaptureFixture[s
     lines = capsys.readouterr().out.partition("examples:\n")[2].partition("\n\n")[0].splitlines()
     examples = [line.strip().partition("   ")[0].split() for line in lines]
     assert len(examples) >= 4
-    for program, *arguments in examples:
-        assert program == "cbrrt"
+    for name, *arguments in examples:
+        assert name == "cbrrt"
         assert callable(build_parser().parse_args(arguments).run)
 
 
@@ -454,9 +454,9 @@ def test_control_c_ends_a_running_plan(tmp_path: Path) -> None:
     path = tmp_path / "endless.yaml"
     path.write_text(WALLED.replace("max_samples: 50", "max_samples: 100000000"), encoding="utf-8")
     code = f"""import contextlib, signal, sys
-from cbrrt_ompl import cli
-cli._progress = lambda *_: contextlib.nullcontext(lambda samples, elapsed: signal.raise_signal(signal.SIGINT))
-sys.exit(cli.main(["plan", {str(path)!r}, "--time-limit", "30"]))"""
+from cbrrt_ompl.cli import main, plan
+plan.plan_progress = lambda *_: contextlib.nullcontext(lambda samples, elapsed: signal.raise_signal(signal.SIGINT))
+sys.exit(main(["plan", {str(path)!r}, "--time-limit", "30"]))"""
     started = time.monotonic()
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
     assert (done.returncode, done.stdout, done.stderr.splitlines()[-1]) == (130, "", "cbrrt: interrupted")

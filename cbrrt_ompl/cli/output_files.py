@@ -1,0 +1,81 @@
+"""Files that commands write: their options, and whether they can be written, before any work."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from cbrrt_ompl.errors import CbrrtError, InputError, Problem
+
+SUFFIXES = {
+    "trajectory": (".csv", ".npz", ".json"),
+    "figure": (".png", ".pdf", ".svg"),
+    "animation": (".gif", ".html", ".mp4"),
+    "database": (".db", ".sqlite", ".sqlite3"),
+}
+"""What the names of files end in, by the option that takes them."""
+
+
+def add_output_files(parser: argparse.ArgumentParser, files: Mapping[str, str]) -> None:
+    """Options that take files to write.
+
+    Args:
+        parser: takes the options.
+        files: what is written, by the option's name from `SUFFIXES`.
+    """
+    for name, meaning in files.items():
+        *others, last = SUFFIXES[name]
+        text = f"{meaning}: {', '.join(others)} or {last}"
+        parser.add_argument(f"--{name}", type=Path, metavar="FILE", help=text)
+
+
+def check_output_files(arguments: argparse.Namespace, names: Iterable[str]) -> None:
+    """Find out before any work whether its results can be written.
+
+    Args:
+        arguments: the command line.
+        names: options from `SUFFIXES` that the command writes files for, where they are given.
+
+    Raises:
+        InputError: with every file that cannot be written, or for a kind of animation that needs a program.
+        CbrrtError: if matplotlib, which is to draw one of them, cannot be used.
+    """
+    files = {name: path for name in names if (path := getattr(arguments, name)) is not None}
+    problems = [
+        Problem(f"--{name}", str(path), expected)
+        for name, path in files.items()
+        if (expected := _missing_to_write(path, SUFFIXES[name]))
+    ]
+    if problems:
+        raise InputError(problems)
+    if "figure" in files or "animation" in files:
+        check_backend()
+    if "animation" in files:
+        from cbrrt_ompl.animation import check_animation_file
+
+        check_animation_file(files["animation"])
+
+
+def _missing_to_write(path: Path, suffixes: tuple[str, ...]) -> str | None:
+    """What a file should be to be written; None where it can be."""
+    if path.suffix.lower() not in suffixes:
+        return f"a file name that ends in {', '.join(suffixes)}"
+    if not path.parent.is_dir():
+        return f"a file in a folder that exists, {path.parent} does not"
+    if path.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
+        return "a file that may be written"
+    return None
+
+
+def check_backend() -> None:
+    """Import matplotlib, which refuses a wrong MPLBACKEND.
+
+    Raises:
+        CbrrtError: if it does.
+    """
+    try:
+        import matplotlib  # noqa: F401  # the import is the check
+    except ValueError as error:
+        raise CbrrtError(f"MPLBACKEND: {error}") from None

@@ -1,0 +1,103 @@
+"""``cbrrt plan``: a trajectory through a scenario."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from cbrrt_ompl.cli.arguments import (
+    Commands,
+    add_command,
+    add_json,
+    add_planner,
+    add_scenario,
+    add_seed,
+    add_time_limit,
+)
+from cbrrt_ompl.cli.exit_codes import DONE, FAILED
+from cbrrt_ompl.cli.output import print_json, print_values, verdict
+from cbrrt_ompl.cli.output_files import add_output_files, check_output_files
+from cbrrt_ompl.cli.progress import plan_progress, warm_up
+
+if TYPE_CHECKING:
+    from cbrrt_ompl.planning import PlanResult
+
+FILES = {
+    "trajectory": "write the trajectory",
+    "figure": "draw scene, tree and path",
+    "animation": "show the robot drive",
+}
+"""What is written, by the option that asks for it."""
+
+
+def add_parser(commands: Commands) -> None:
+    """Add the command to the grammar."""
+    example = "cbrrt plan paper_case1 --seed 1 --trajectory case1.csv --figure case1.png"
+    parser = add_command(commands, "plan", run, "plan a trajectory through a scenario", example)
+    add_scenario(parser)
+    add_planner(parser, "cb-rrt")
+    add_seed(parser)
+    add_time_limit(parser, "planning time")
+    add_output_files(parser, FILES)
+    add_json(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """``cbrrt plan``."""
+    check_output_files(arguments, FILES)
+    from cbrrt_ompl.planning import plan
+    from cbrrt_ompl.scenario import load_scenario
+
+    scenario = load_scenario(arguments.scenario)
+    warm_up(arguments.planner)
+    with plan_progress(scenario.planning.max_samples, arguments.planner) as progress:
+        result = plan(scenario, arguments.planner, arguments.seed, arguments.time_limit, progress=progress)
+    trajectory = result.trajectory
+    if arguments.trajectory is not None and trajectory is not None:
+        trajectory.save(arguments.trajectory)
+    if arguments.figure is not None:
+        from cbrrt_ompl.figures import draw_plan
+        from cbrrt_ompl.files import save_figure
+
+        save_figure(draw_plan(result, scenario), arguments.figure)
+    if arguments.animation is not None and trajectory is not None:
+        from cbrrt_ompl.animation import animate, save_animation
+
+        save_animation(animate(trajectory, scenario, result.tree), arguments.animation)
+    data = {"scenario": scenario.name, **_data(result)}
+    if arguments.json:
+        written = None if trajectory is None else arguments.trajectory
+        print_json({**data, "trajectory": written, "figure": arguments.figure})
+    else:
+        print_values(_values(data))
+        if arguments.trajectory is not None and trajectory is None:
+            print(f"no trajectory, {arguments.trajectory} not written")
+    return DONE if result.solved else FAILED
+
+
+def _data(result: PlanResult) -> dict[str, Any]:
+    """What came of a plan, for programs, in SI units."""
+    names = ("planner", "seed", "solved", "status", "nodes", "samples", "planning_time")
+    trajectory = result.trajectory
+    return {
+        **{name: getattr(result, name) for name in names},
+        "duration": None if trajectory is None else trajectory.duration,
+        "length": None if trajectory is None else trajectory.length,
+        "point_turns": None if trajectory is None else len(trajectory.point_turns),
+    }
+
+
+def _values(data: dict[str, Any]) -> dict[str, str]:
+    """What came of a plan, for people."""
+    values = {"scenario": data["scenario"], "planner": data["planner"]}
+    values["status"] = verdict(data["status"], data["solved"])
+    if data["seed"] is not None:
+        values["seed"] = f"{data['seed']}"
+    values["nodes"] = f"{data['nodes']:,}"
+    values["samples"] = f"{data['samples']:,}"
+    values["planning time"] = f"{1e3 * data['planning_time']:.2f} ms"
+    if data["solved"]:
+        values["duration"] = f"{data['duration']:.2f} s"
+        values["length"] = f"{data['length']:.2f} m"
+        values["point turns"] = f"{data['point_turns']}"
+    return values

@@ -1,0 +1,99 @@
+"""``cbrrt``: the grammar of all commands, and a command line run from its words to its exit code.
+
+Modules that take long to import are imported where commands use them, so that ``cbrrt --help`` answers at once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import os
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+from cbrrt_ompl.cli import bench, completion, demo, drive, plan, planners, report, reproduce, show, verify
+from cbrrt_ompl.cli.exit_codes import BAD_INPUT, BROKEN_PIPE, INTERRUPTED
+from cbrrt_ompl.cli.output import print_error
+from cbrrt_ompl.errors import CbrrtError
+
+COMMANDS = (plan, drive, verify, show, planners, bench, report, reproduce, demo, completion)
+"""The modules of the commands, in the order of the help."""
+
+EXAMPLES = """\
+examples:
+  cbrrt plan paper_case1 --seed 1 --figure case1.png   a scene of the paper
+  cbrrt plan depot.yaml --planner cb-rrt-robust --trajectory depot.csv
+  cbrrt drive office --seed 2 --animation office.gif   plan again on the way
+  cbrrt verify depot.csv depot.yaml                    check it by other code
+  cbrrt bench maze office --runs 20 --database bench.db --log-dir logs
+  cbrrt report bench.db --output report                tables and charts
+
+'cbrrt COMMAND --help' explains a command."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command line.
+
+    Args:
+        argv: the arguments after the program's name; None takes those of the process.
+
+    Returns:
+        The exit code.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # a name may hold what the terminal has no letters for
+    try:
+        arguments = build_parser().parse_args(argv)
+        code: int = arguments.run(arguments)
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        print("cbrrt: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return BROKEN_PIPE
+    except (CbrrtError, OSError) as error:
+        print_error(error)
+        return BAD_INPUT
+    return code
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The grammar of the command line; what it parses holds the function to `run` and this `parser`."""
+    parser = _Parser(
+        prog="cbrrt",
+        description="Plan trajectories for two-wheeled robots with CB-RRT and S-RRT in OMPL.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.set_defaults(parser=parser)
+    parser.add_argument("--version", action=_Version, help="print the version and exit")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for command in COMMANDS:
+        command.add_parser(commands)
+    return parser
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line, like all others of this program."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print the line and leave with exit code 2."""
+        self.exit(BAD_INPUT, f"cbrrt: error: {message} (see '{self.prog} --help')\n")
+
+
+class _Version(argparse.Action):
+    """``--version``, looked up only when asked for."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str, help: str) -> None:
+        """An option without a value."""
+        super().__init__(option_strings, dest, nargs=0, help=help)
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        """Print it and leave."""
+        from cbrrt_ompl import __version__
+
+        print(f"cbrrt {__version__}")
+        parser.exit()

@@ -1,0 +1,60 @@
+"""What tells a user at a terminal that something takes long: progress lines, and a word on compilation."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Any
+
+
+def warm_up(planner: str) -> None:
+    """Load the kernels of a planner, and say so where they must be compiled first."""
+    from cbrrt_ompl import warm_up as kernels
+    from cbrrt_ompl.extension import COMPILED_PLANNERS
+
+    message = "cbrrt: compiling the planners, once after installation ..."
+    timer = threading.Timer(1.0, print, [message], {"file": sys.stderr, "flush": True})
+    timer.daemon = True
+    timer.start()
+    try:
+        kernels.warm_up(needs_ompl=planner not in COMPILED_PLANNERS)
+    finally:
+        timer.cancel()
+
+
+@contextmanager
+def plan_progress(total: int, label: str) -> Iterator[Callable[[int, float], None] | None]:
+    """A progress line for :func:`cbrrt_ompl.plan` once it has taken a second; None where nobody watches."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from tqdm import tqdm
+
+    with tqdm(total=total, desc=label, unit=" samples", delay=1.0, leave=False, file=sys.stderr) as bar:
+
+        def report(samples: int, elapsed: float) -> None:
+            bar.update(samples - bar.n)
+
+        yield report
+
+
+@contextmanager
+def run_progress(total: int) -> Iterator[Callable[[int], None]]:
+    """A progress line for a campaign, with the time left; silent where nobody watches."""
+    if not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    from tqdm import tqdm
+
+    with ExitStack() as stack:
+        bars: list[Any] = []
+
+        def report(done: int) -> None:
+            if not bars:  # what former calls have done tells nothing of the time left
+                bars.append(tqdm(total=total, initial=done, desc="runs", unit="", smoothing=0.0, file=sys.stderr))
+                stack.enter_context(bars[0])
+            bars[0].update(done - bars[0].n)
+
+        yield report
