@@ -129,6 +129,24 @@ def test_json_of_an_unsolved_plan_has_no_trajectory(walled_file: Path, capsys: p
     assert printed["trajectory"] is printed["duration"] is printed["length"] is printed["point_turns"] is None
 
 
+def test_files_of_an_unsolved_plan_are_said_not_to_be_written(
+    walled_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """An animation that was asked for in vain was passed over in silence."""
+    files = {"trajectory": tmp_path / "a.csv", "figure": tmp_path / "a.png", "animation": tmp_path / "a.gif"}
+    arguments = ["plan", str(walled_file), "--seed", "1"]
+    arguments += [text for name, path in files.items() for text in (f"--{name}", str(path))]
+    assert main(arguments) == 1
+    lines = [f"no trajectory, {files[name]} not written" for name in ("trajectory", "animation")]
+    assert capsys.readouterr().out.splitlines()[-2:] == lines
+    assert main([*arguments, "--json"]) == 1
+    printed = json.loads(capsys.readouterr().out)
+    assert {name: printed[name] for name in files} == {
+        "trajectory": None, "figure": str(files["figure"]), "animation": None,
+    }  # fmt: skip
+    assert sorted(tmp_path.glob("a.*")) == [files["figure"]]
+
+
 @pytest.mark.parametrize("suffix", [".png", ".pdf", ".svg"])
 def test_figures_are_written_in_every_format(open_file: Path, tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"figure{suffix}"

@@ -43,7 +43,7 @@ def test_drive_prints_what_came_of_it_and_writes_its_files(
     files = ["--trajectory", str(table), "--figure", str(picture), "--animation", str(gif)]
     assert main(["drive", hall, "--sensor-range", "2.5", "--max-samples", "3000", "--seed", "4", *files]) == 0
     printed = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines() if len(line.split()) == 2)
-    assert (printed["status"], printed["verified"]) == ("reached", "valid")
+    assert (printed["status"], printed["seed"], printed["verified"]) == ("reached", "4", "valid")
     assert main(["verify", str(table), hall]) == 0
     for file in (picture, gif):
         with Image.open(file) as image:
@@ -57,6 +57,7 @@ def test_drive_with_json_prints_the_figures(hall: str, tmp_path: Path, capsys: p
     figures = json.loads(capsys.readouterr().out)
     assert (figures["reached"], figures["obstacles_found"], figures["obstacles_hidden"]) == (True, 1, 1)
     assert figures["duration"] == pytest.approx(Trajectory.load(table).duration)
+    assert (figures["trajectory"], figures["figure"], figures["animation"]) == (str(table), None, None)
     assert figures["violations"] == []
     assert figures["smallest_clearance"] > 0.0
 
@@ -104,8 +105,10 @@ def test_bad_input_to_drive_is_one_line(
     assert error.startswith("cbrrt: error: ") and error.count("\n") == 1
 
 
-def test_plan_writes_an_animation(hall: str, tmp_path: Path) -> None:
+def test_plan_writes_an_animation(hall: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     gif = tmp_path / "plan.gif"
-    assert main(["plan", hall, "--planner", "cb-rrt-compiled", "--seed", "1", "--animation", str(gif)]) == 0
+    assert main(["plan", hall, "--planner", "cb-rrt-compiled", "--seed", "1", "--animation", str(gif), "--json"]) == 0
     with Image.open(gif) as image:
         assert image.n_frames == 3
+    printed = json.loads(capsys.readouterr().out)
+    assert (printed["trajectory"], printed["animation"]) == (None, str(gif))

@@ -18,7 +18,7 @@ from cbrrt_ompl.cli.arguments import (
     seconds,
 )
 from cbrrt_ompl.cli.exit_codes import DONE, FAILED
-from cbrrt_ompl.cli.output import print_json, print_values, verdict
+from cbrrt_ompl.cli.output import heading, print_json, print_values
 from cbrrt_ompl.cli.output_files import add_output_files, check_output_files
 from cbrrt_ompl.cli.progress import warm_up
 
@@ -90,7 +90,7 @@ def run(arguments: argparse.Namespace) -> int:
         save_animation(animate_drive(result), arguments.animation)
     data = {"scenario": scenario.name, "seed": arguments.seed, **_data(result)}
     if arguments.json:
-        print_json(data)
+        print_json({**data, **{name: getattr(arguments, name) for name in FILES}})
     else:
         print_values(_values(data))
     return DONE if result.reached else FAILED
@@ -121,9 +121,7 @@ def _values(data: dict[str, Any]) -> dict[str, str]:
     """What came of a drive, for people."""
     violations = data["violations"]
     return {
-        "scenario": data["scenario"],
-        "planner": data["planner"],
-        "status": verdict(data["status"], data["reached"]),
+        **heading(data, data["reached"]),
         "duration": f"{data['duration']:.2f} s",
         "length": f"{data['length']:.2f} m",
         "plans": f"{data['plans']}, {data['plans_taken']} taken",

@@ -24,6 +24,12 @@ def print_values(values: Mapping[str, str]) -> None:
         print(f"{name:{width}}  {value}")
 
 
+def heading(data: Mapping[str, Any], is_good: bool) -> dict[str, str]:
+    """Scenario, planner, status and seed of a plan or a drive, for people; no seed where none was asked for."""
+    values = {"scenario": data["scenario"], "planner": data["planner"], "status": verdict(data["status"], is_good)}
+    return values if data["seed"] is None else {**values, "seed": f"{data['seed']}"}
+
+
 def table_line(cells: Iterable[str], widths: Iterable[int], left: int) -> str:
     """A line of a table, the first cells to the left of their columns and the others to the right.
 

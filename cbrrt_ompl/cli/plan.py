@@ -15,7 +15,7 @@ from cbrrt_ompl.cli.arguments import (
     add_time_limit,
 )
 from cbrrt_ompl.cli.exit_codes import DONE, FAILED
-from cbrrt_ompl.cli.output import print_json, print_values, verdict
+from cbrrt_ompl.cli.output import heading, print_json, print_values
 from cbrrt_ompl.cli.output_files import add_output_files, check_output_files
 from cbrrt_ompl.cli.progress import plan_progress, warm_up
 
@@ -65,13 +65,15 @@ def run(arguments: argparse.Namespace) -> int:
 
         save_animation(animate(trajectory, scenario, result.tree), arguments.animation)
     data = {"scenario": scenario.name, **_data(result)}
+    files = {name: getattr(arguments, name) for name in FILES}
+    unwritten = ("trajectory", "animation") if trajectory is None else ()
     if arguments.json:
-        written = None if trajectory is None else arguments.trajectory
-        print_json({**data, "trajectory": written, "figure": arguments.figure})
+        print_json({**data, **files, **dict.fromkeys(unwritten)})
     else:
         print_values(_values(data))
-        if arguments.trajectory is not None and trajectory is None:
-            print(f"no trajectory, {arguments.trajectory} not written")
+        for name in unwritten:
+            if files[name] is not None:
+                print(f"no trajectory, {files[name]} not written")
     return DONE if result.solved else FAILED
 
 
@@ -89,15 +91,16 @@ def _data(result: PlanResult) -> dict[str, Any]:
 
 def _values(data: dict[str, Any]) -> dict[str, str]:
     """What came of a plan, for people."""
-    values = {"scenario": data["scenario"], "planner": data["planner"]}
-    values["status"] = verdict(data["status"], data["solved"])
-    if data["seed"] is not None:
-        values["seed"] = f"{data['seed']}"
-    values["nodes"] = f"{data['nodes']:,}"
-    values["samples"] = f"{data['samples']:,}"
-    values["planning time"] = f"{1e3 * data['planning_time']:.2f} ms"
+    values = {
+        **heading(data, data["solved"]),
+        "nodes": f"{data['nodes']:,}",
+        "samples": f"{data['samples']:,}",
+        "planning time": f"{1e3 * data['planning_time']:.2f} ms",
+    }
     if data["solved"]:
-        values["duration"] = f"{data['duration']:.2f} s"
-        values["length"] = f"{data['length']:.2f} m"
-        values["point turns"] = f"{data['point_turns']}"
+        values |= {
+            "duration": f"{data['duration']:.2f} s",
+            "length": f"{data['length']:.2f} m",
+            "point turns": f"{data['point_turns']}",
+        }
     return values
