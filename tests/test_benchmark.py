@@ -643,9 +643,9 @@ def test_bad_arguments_are_one_line(
     monkeypatch.setattr(cluster, "CONNECT_TIMEOUT", 0.2)
     good = {"--database": str(tmp_path / "a.db"), "--log-dir": str(tmp_path / "logs"), "--planner": "rrt"}
     for more, message in (
-        ({"--runs": "0"}, "argument --runs: got '0', expected a whole number, 1 or more"),
-        ({"--jobs": "two"}, "argument --jobs: got 'two', expected a whole number, 1 or more"),
-        ({"--time-limit": "0"}, "argument --time-limit: got '0', expected a number of seconds above 0"),
+        ({"--runs": "0"}, "--runs: got '0', expected a whole number of 1 or more"),
+        ({"--jobs": "two"}, "--jobs: got 'two', expected a whole number of 1 or more"),
+        ({"--time-limit": "0"}, "--time-limit: got '0', expected a number of seconds above 0"),
         ({"--planner": "rtt"}, "planner: got 'rtt', expected one of cb-rrt, "),
         ({"--database": str(tmp_path / "missing" / "a.db")}, "--database: got "),
         ({"--database": str(tmp_path / "a.txt")}, "--database: got "),

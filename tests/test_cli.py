@@ -184,13 +184,31 @@ def test_both_outputs_are_reported_together(open_file: Path, capsys: pytest.Capt
 @pytest.mark.parametrize("value", ["-1", "0", "nan", "inf", "soon"])
 def test_a_time_limit_that_is_none_is_refused(open_file: Path, capsys: pytest.CaptureFixture[str], value: str) -> None:
     line = argument_error(capsys, "plan", str(open_file), f"--time-limit={value}")
-    assert line.startswith(f"argument --time-limit: got '{value}', expected a number of seconds above 0")
+    assert line.startswith(f"--time-limit: got '{value}', expected a number of seconds above 0")
 
 
-@pytest.mark.parametrize("value", ["-1", "1.5", "x"])
+@pytest.mark.parametrize("value", ["-1", "1.5", "x", "²"])
 def test_a_seed_that_is_none_is_refused(open_file: Path, capsys: pytest.CaptureFixture[str], value: str) -> None:
     line = argument_error(capsys, "plan", str(open_file), f"--seed={value}")
-    assert line.startswith(f"argument --seed: got '{value}', expected a whole number")
+    assert line.startswith(f"--seed: got '{value}', expected a whole number")
+
+
+def test_a_number_of_thousands_of_digits_is_refused_in_one_short_line(capsys: pytest.CaptureFixture[str]) -> None:
+    """Python does not convert it, and the line told the name of a function and all digits."""
+    line = argument_error(capsys, "demo", "--seed", "9" * 5000)
+    assert line.startswith("--seed: got '999")
+    assert line.endswith("9..., expected a whole number of 0 or more (see 'cbrrt demo --help')")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "field", "known"),
+    [(["plna"], "COMMAND", COMMANDS), (["completion", "fish"], "SHELL", ["bash", "zsh", "tcsh"])],
+)
+def test_an_unknown_word_is_told_the_known_ones(
+    capsys: pytest.CaptureFixture[str], arguments: list[str], field: str, known: list[str]
+) -> None:
+    line = argument_error(capsys, *arguments)
+    assert line.startswith(f"{field}: got '{arguments[-1]}', expected one of {', '.join(known)} (see ")
 
 
 @pytest.mark.parametrize("arguments", [[], ["plna"], ["plan"], ["plan", "a.yaml", "--color"]])
@@ -309,9 +327,11 @@ def test_colors_are_for_terminals_without_no_color(
         monkeypatch.setattr(stream, "isatty", lambda: terminal)
     assert main(["plan", str(open_file), "--seed", "1"]) == 0
     assert main(["plan", str(open_file.with_name("none.yaml"))]) == 2
+    with pytest.raises(SystemExit):
+        main(["plan"])
     captured = capsys.readouterr()
     assert ("\033[32msolved\033[0m" in captured.out) == ("\033" in captured.out) == colored
-    assert ("\033[31mcbrrt: error:\033[0m" in captured.err) == ("\033" in captured.err) == colored
+    assert captured.err.count("\033[31mcbrrt: error:\033[0m") == captured.err.count("\033[31m") == (2 if colored else 0)
 
 
 def test_planners_as_json(capsys: pytest.CaptureFixture[str]) -> None:

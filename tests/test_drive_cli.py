@@ -83,12 +83,12 @@ def test_drive_with_random_obstacles_is_repeated_by_its_seed(hall: str, capsys: 
     ("arguments", "message"),
     [
         (["--sensor-range", "1"], "sensor_range: got 1.0, expected more than 1.2"),
-        (["--sensor-range", "-1"], "got '-1', expected a number of metres above 0"),
+        (["--sensor-range", "-1"], "--sensor-range: got '-1', expected a number of metres above 0"),
         (["--cycle", "0.07"], "cycle: got 0.07, expected a multiple of planning.step"),
         (["--planner", "s-rrt"], "planner: got 's-rrt', expected one of"),
         (["--animation", "way.avi"], "--animation: got 'way.avi', expected a file name that ends in .gif, .html, .mp4"),
         (["--hidden", "nowhere.yaml"], "nowhere.yaml"),
-        (["--unknown", "0"], "expected a whole number, 1 or more"),
+        (["--unknown", "0"], "--unknown: got '0', expected a whole number of 1 or more"),
         (["--unknown", "1", "--hidden", "a.yaml"], "not allowed with argument"),
     ],
 )

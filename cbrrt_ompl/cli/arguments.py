@@ -9,6 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
+from cbrrt_ompl.errors import Problem
+
 if TYPE_CHECKING:
     from cbrrt_ompl.trajectory import Trajectory
 
@@ -110,12 +112,21 @@ def _above_zero(text: str, unit: str) -> float:
     except ValueError:
         value = math.nan
     if not (math.isfinite(value) and value > 0.0):
-        raise argparse.ArgumentTypeError(f"got {text!r}, expected a number of {unit} above 0")
+        raise _refusal(text, f"a number of {unit} above 0")
     return value
 
 
 def _whole(text: str, least: int) -> int:
     """A whole number from the command line."""
-    if not (text.isascii() and text.isdigit() and int(text) >= least):
-        raise argparse.ArgumentTypeError(f"got {text!r}, expected a whole number, {least} or more")
-    return int(text)
+    try:
+        value = int(text) if text.isascii() and text.isdigit() else -1
+    except ValueError:  # more than 4,300 digits
+        value = -1
+    if value < least:
+        raise _refusal(text, f"a whole number of {least} or more")
+    return value
+
+
+def _refusal(text: str, expected: str) -> argparse.ArgumentTypeError:
+    """The complaint about a value, in the words of all others of this package."""
+    return argparse.ArgumentTypeError(str(Problem("", text, expected)))

@@ -10,12 +10,12 @@ import io
 import os
 import sys
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from cbrrt_ompl.cli import bench, completion, demo, drive, plan, planners, report, reproduce, show, verify
 from cbrrt_ompl.cli.exit_codes import BAD_INPUT, BROKEN_PIPE, INTERRUPTED
 from cbrrt_ompl.cli.output import print_error
-from cbrrt_ompl.errors import CbrrtError
+from cbrrt_ompl.errors import CbrrtError, Problem
 
 COMMANDS = (plan, drive, verify, show, planners, bench, report, reproduce, demo, completion)
 """The modules of the commands, in the order of the help."""
@@ -77,11 +77,18 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser whose errors are one line, like all others of this program."""
+    """A parser whose errors are one line and in the words of all others of this program."""
 
     def error(self, message: str) -> NoReturn:
         """Print the line and leave with exit code 2."""
-        self.exit(BAD_INPUT, f"cbrrt: error: {message} (see '{self.prog} --help')\n")
+        print_error(CbrrtError(f"{message.removeprefix('argument ')} (see '{self.prog} --help')"))
+        self.exit(BAD_INPUT)
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Refuse what is none of the choices."""
+        if action.choices is not None and value not in action.choices:
+            problem = Problem("", value, f"one of {', '.join(action.choices)}")
+            raise argparse.ArgumentError(action, str(problem))
 
 
 class _Version(argparse.Action):
