@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import subprocess
@@ -14,6 +15,7 @@ import pytest
 
 from cbrrt_ompl import __version__, demo, figures, planning
 from cbrrt_ompl.cli import build_parser, main, program
+from cbrrt_ompl.cli.output_files import SUFFIXES
 from cbrrt_ompl.errors import InputError, Problem
 from cbrrt_ompl.scenario import load_scenario
 from cbrrt_ompl.trajectory import Trajectory
@@ -304,6 +306,31 @@ def test_the_examples_of_the_whole_command_exist(capsys: pytest.CaptureFixture[s
     for name, *arguments in examples:
         assert name == "cbrrt"
         assert callable(build_parser().parse_args(arguments).run)
+
+
+def commands_of(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    """The parsers of all commands by their names."""
+    (commands,) = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
+    return commands.choices
+
+
+def test_help_of_every_option_tells_its_default() -> None:
+    actions = [action for command in commands_of(build_parser()).values() for action in command._actions]
+    options = [action for action in actions if action.default not in (None, False, argparse.SUPPRESS)]
+    assert {"--planner", "--output", "--cycle"} <= {option.option_strings[0] for option in options}
+    for option in options:
+        default = f"{option.default:g}" if isinstance(option.default, float) else f"{option.default}"
+        assert f"(default: {default})" in str(option.help), option.option_strings
+
+
+@pytest.mark.parametrize(
+    ("command", "name"),
+    [("plan", "trajectory"), ("drive", "animation"), ("show", "figure"), ("bench", "database")],
+)
+def test_help_of_a_file_to_write_tells_all_its_suffixes(command: str, name: str) -> None:
+    (option,) = [action for action in commands_of(build_parser())[command]._actions if action.dest == name]
+    *others, last = SUFFIXES[name]
+    assert f"{', '.join(others)} or {last}" in str(option.help)
 
 
 def test_help_fits_80_columns(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -18,7 +18,7 @@ from cbrrt_ompl.cli.arguments import (
 )
 from cbrrt_ompl.cli.exit_codes import DONE, FAILED
 from cbrrt_ompl.cli.output import kept_runs, print_json, print_values
-from cbrrt_ompl.cli.output_files import check_output_files
+from cbrrt_ompl.cli.output_files import add_output_files, check_output_files
 from cbrrt_ompl.cli.progress import run_progress
 
 
@@ -38,7 +38,7 @@ def add_parser(commands: Commands) -> None:
         "--runs", type=count, default=20, metavar="N", help="runs of each planner in each scenario (default: 20)"
     )
     add_time_limit(parser, "time of a run")
-    parser.add_argument("--database", type=Path, required=True, metavar="FILE", help="database to make: .db")
+    add_output_files(parser, {"database": "database to make"}, required=True)
     parser.add_argument(
         "--log-dir", type=Path, required=True, metavar="DIR",
         help="folder for OMPL's logs; the same command goes on from what it holds",

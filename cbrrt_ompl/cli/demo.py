@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import argparse
 import textwrap
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cbrrt_ompl.cli.arguments import Commands, add_command, seed
 from cbrrt_ompl.cli.exit_codes import DONE, FAILED
 from cbrrt_ompl.cli.output import LINE_WIDTH, print_missing, table_line
-from cbrrt_ompl.cli.output_files import check_backend
+from cbrrt_ompl.cli.output_files import add_output_folder, check_backend
 from cbrrt_ompl.cli.progress import plan_progress, run_progress
 
 if TYPE_CHECKING:
@@ -24,9 +23,7 @@ def add_parser(commands: Commands) -> None:
     """Add the command to the grammar."""
     summary = "run both planners of the paper on its two scenes, and make the short report"
     parser = add_command(commands, "demo", run, summary, "cbrrt demo --output demo")
-    parser.add_argument(
-        "--output", type=Path, default=Path("demo"), metavar="DIR", help="folder for figures, trajectories and table"
-    )
+    add_output_folder(parser, "demo", "figures, trajectories, table and report")
     parser.add_argument("--seed", type=seed, default=1, metavar="N", help="seed of every plan (default: 1)")
 
 

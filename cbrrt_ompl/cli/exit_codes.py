@@ -1,4 +1,4 @@
-"""How a command ends; 0 to 2 and 130 are documented in docs/cli.md."""
+"""How a command ends; docs/cli.md says what the first four mean, the last is that of a broken pipe."""
 
 from __future__ import annotations
 

@@ -18,17 +18,30 @@ SUFFIXES = {
 """What the names of files end in, by the option that takes them."""
 
 
-def add_output_files(parser: argparse.ArgumentParser, files: Mapping[str, str]) -> None:
+def add_output_files(parser: argparse.ArgumentParser, files: Mapping[str, str], required: bool = False) -> None:
     """Options that take files to write.
 
     Args:
         parser: takes the options.
         files: what is written, by the option's name from `SUFFIXES`.
+        required: whether they must be given.
     """
     for name, meaning in files.items():
         *others, last = SUFFIXES[name]
         text = f"{meaning}: {', '.join(others)} or {last}"
-        parser.add_argument(f"--{name}", type=Path, metavar="FILE", help=text)
+        parser.add_argument(f"--{name}", type=Path, required=required, metavar="FILE", help=text)
+
+
+def add_output_folder(parser: argparse.ArgumentParser, default: str, content: str) -> None:
+    """``--output``, a folder that is made where it is missing.
+
+    Args:
+        parser: takes the option.
+        default: the folder without it.
+        content: what is written there.
+    """
+    text = f"folder for {content} (default: {default})"
+    parser.add_argument("--output", type=Path, default=Path(default), metavar="DIR", help=text)
 
 
 def check_output_files(arguments: argparse.Namespace, names: Iterable[str]) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from cbrrt_ompl.cli.arguments import Commands, add_command, add_json
 from cbrrt_ompl.cli.exit_codes import DONE
 from cbrrt_ompl.cli.output import print_json, table_line
-from cbrrt_ompl.cli.output_files import check_backend
+from cbrrt_ompl.cli.output_files import add_output_folder, check_backend
 
 if TYPE_CHECKING:
     from cbrrt_ompl.benchmark.report import Report
@@ -23,9 +23,7 @@ def add_parser(commands: Commands) -> None:
     summary = "make tables and charts from a benchmark database"
     parser = add_command(commands, "report", run, summary, "cbrrt report bench.db --output report")
     parser.add_argument("database", type=Path, metavar="DB", help="database of 'cbrrt bench'")
-    parser.add_argument(
-        "--output", type=Path, default=Path("report"), metavar="DIR", help="folder for tables and charts"
-    )
+    add_output_folder(parser, "report", "tables and charts")
     parser.add_argument(
         "--reference", metavar="NAME", help="planner to compare the others with (default: cb-rrt, if it is there)"
     )

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from cbrrt_ompl.cli.arguments import Commands, add_command, add_jobs, count
 from cbrrt_ompl.cli.exit_codes import DONE, FAILED
 from cbrrt_ompl.cli.output import kept_runs, print_missing
-from cbrrt_ompl.cli.output_files import check_backend
+from cbrrt_ompl.cli.output_files import add_output_folder, check_backend
 from cbrrt_ompl.cli.progress import run_progress
 
 
@@ -19,10 +18,8 @@ def add_parser(commands: Commands) -> None:
     parser.add_argument(
         "--runs", type=count, default=200, metavar="N", help="runs of each planner in each scene (default: 200)"
     )
-    parser.add_argument(
-        "--output", type=Path, default=Path("reproduction"), metavar="DIR",
-        help="folder for report.html, report.md and the runs; the same command goes on from what it holds",
-    )  # fmt: skip
+    content = "report.html, report.md and the runs; the same command goes on from what it holds"
+    add_output_folder(parser, "reproduction", content)
     add_jobs(parser)
 
 
