@@ -453,6 +453,22 @@ def test_progress_counts_samples(
     assert main(["plan", str(open_file)]) == 2
 
 
+@pytest.mark.parametrize("terminal", [True, False])
+def test_compilation_is_told_of_on_a_terminal_only(
+    open_file: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], terminal: bool
+) -> None:
+    """It was told of in a pipe as well, before the one line of an error."""
+
+    def stop(*_: object, **__: object) -> None:
+        raise InputError(Problem("test", 1, "no plan"))
+
+    monkeypatch.setattr("cbrrt_ompl.warm_up.warm_up", lambda needs_ompl: time.sleep(1.3))
+    monkeypatch.setattr(planning, "plan", stop)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
+    assert main(["plan", str(open_file)]) == 2
+    assert ("compiling the planners" in capsys.readouterr().err) == terminal
+
+
 def test_an_interrupt_is_one_line_and_exit_code_130(
     open_file: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -10,14 +10,15 @@ from typing import Any
 
 
 def warm_up(planner: str) -> None:
-    """Load the kernels of a planner, and say so where they must be compiled first."""
+    """Load the kernels of a planner, and say so on a terminal where they must be compiled first."""
     from cbrrt_ompl import warm_up as kernels
     from cbrrt_ompl.extension import COMPILED_PLANNERS
 
     message = "cbrrt: compiling the planners, once after installation ..."
     timer = threading.Timer(1.0, print, [message], {"file": sys.stderr, "flush": True})
     timer.daemon = True
-    timer.start()
+    if sys.stderr.isatty():
+        timer.start()
     try:
         kernels.warm_up(needs_ompl=planner not in COMPILED_PLANNERS)
     finally:
