@@ -120,6 +120,28 @@ def test_the_tree_is_the_same_however_often_the_search_pauses(scenarios: Path, p
     assert_equal(whole.tree(), interrupted.tree())
 
 
+def test_a_search_stops_within_an_extension_and_goes_on_as_if_it_had_not(
+    scenarios: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A brake-safe extension of a robot with corners can take half a second."""
+    scenario = load_scenario(scenarios / "office.yaml")
+    scenario = replace(scenario, planning=replace(scenario.planning, brake_safe=True))
+    whole = grow(scenario, "cb-rrt-compiled", 3, 12, clearance_map(scenario, enabled=False))
+    monkeypatch.setattr("cbrrt_ompl.compiled.search.PAUSE", 0.0)
+    model = pack_model(law_of("cb-rrt-compiled", scenario.planning), scenario.robot, scenario.goal, scenario.planning)
+    search = Search(model, clearance_map(scenario, enabled=False), [scenario.start], 3)
+    asked = []
+
+    def should_stop(samples: int) -> bool:
+        asked.append(samples)
+        return len(asked) >= 4
+
+    search.run(should_stop, 12)
+    assert asked == [0, 0, 0, 0, 0]  # before the first extension, within it, and before it again
+    search.run(lambda _: False, 12)
+    assert_equal(whole.tree(), search.tree())
+
+
 def trees_by_neighbours(scenario: Scenario, samples: int) -> list[Tree]:
     """The trees that each way to find the nearest node leads to."""
     trees = []

@@ -506,3 +506,19 @@ def test_the_random_numbers_of_python_are_left_alone() -> None:
     random.seed(5)
     plan(EASY, "cb-rrt", seed=1)
     assert random.random() == expected
+
+
+def test_a_plan_stops_within_an_extension(scenarios: Path) -> None:
+    """A brake-safe extension of a robot with corners can take half a second."""
+    scenario = load_scenario(scenarios / "office.yaml")
+    scenario = replace(scenario, planning=replace(scenario.planning, brake_safe=True))
+    asked = []
+
+    def should_stop(samples: int) -> bool:
+        asked.append(samples)
+        return len(asked) >= 5
+
+    without = ClearanceMap(scenario.world, scenario.robot.footprint, enabled=False)
+    found = run(scenario, "cb-rrt", 1, lambda: None, should_stop, without)
+    assert asked == [0, 1, 1, 1, 1, 1]  # by the main loop, within the first extension, and by the main loop again
+    assert (found.samples, found.nodes, found.trajectory) == (1, 1, None)

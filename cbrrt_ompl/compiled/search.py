@@ -109,13 +109,16 @@ class Search:
             if should_stop(self.samples):
                 return
             before, began = self.samples, time.perf_counter()
-            self._grow(min(max_samples, before + portion), began + 2.0 * PAUSE)
+            self._grow(min(max_samples, before + portion), began + 2.0 * PAUSE, should_stop)
             elapsed = max(time.perf_counter() - began, 1e-6)
             done = self.samples - before
             portion = int(min(max(16, done * PAUSE / elapsed), 4 * portion))
 
-    def _grow(self, last_sample: int, deadline: float) -> None:
-        """Run the loop up to a number of samples, or until the deadline passes while FCL is asked."""
+    def _grow(self, last_sample: int, deadline: float, should_stop: Callable[[int], bool]) -> None:
+        """Run the loop up to a number of samples, or until the deadline passes while FCL is asked.
+
+        An extension that takes longer goes on, unless the search is to stop; it is then begun anew if that goes on.
+        """
         t, m = self._tree, self._map
         answered, asked_at, first_sample = 0, -1, self.samples
         while True:
@@ -141,9 +144,12 @@ class Search:
                 self._scratch,
             )
             if status == WANT_ANSWER:
-                if self.samples != asked_at:  # a new extension
-                    if self.samples > first_sample and time.perf_counter() > deadline:
+                is_new = self.samples != asked_at
+                if time.perf_counter() > deadline:
+                    if (is_new and self.samples > first_sample) or should_stop(self.samples):
                         return
+                    deadline = time.perf_counter() + PAUSE
+                if is_new:
                     answered, asked_at = 0, self.samples
                 answered = m.answer(answered, *self._question.tolist())
             elif status == WANT_DRAWS:

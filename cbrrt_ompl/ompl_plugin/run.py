@@ -53,7 +53,7 @@ def run(
         planner: a name that :func:`cbrrt_ompl.ompl_plugin.setup.make_setup` knows.
         seed: 0 or more, or None for a fresh one.
         on_start: called when the search begins.
-        should_stop: called once a round of the planner's main loop, with the rounds so far.
+        should_stop: called once a round of the planner's main loop, with the rounds so far, and within long extensions.
         clearance_map: of the scenario's world and footprint; None takes the one that goes with the world.
         on_equipped: takes what the planner was given.
         prepare: takes the ``SimpleSetup`` before it is set up, to change it.
@@ -63,6 +63,7 @@ def run(
         ou.RNG.setSeed(1 + (secrets.randbits(31) if seed is None else int(seed)))
         clearance_map = clearance_map or clearance_map_for(scenario.world, scenario.robot.footprint)
         setup, equipment = make_equipped_setup(scenario, planner, clearance_map)
+        equipment.should_stop = should_stop
         on_equipped(equipment)
         prepare(setup)
         setup.setup()

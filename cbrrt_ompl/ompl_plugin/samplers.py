@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,7 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
     first state in the goal region. OMPL makes one sampler a tree, so the sampler remembers the children of its nodes.
 
     Attributes:
+        should_stop: asked with the samples so far whenever FCL has to be; an extension that it ends adds nothing.
         samples: calls so far.
         refused: calls refused by line 5 of Algorithm II.
         children: nodes made so far.
@@ -49,6 +51,7 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
             clearance_map: decides the states.
         """
         super().__init__(si)
+        self.should_stop: Callable[[int], bool] = lambda _: False
         self.samples = 0
         self.refused = 0
         self._node, self._sample = StateReals(space, STATE_DIMENSION), StateReals(space, STATE_DIMENSION)
@@ -104,9 +107,9 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         )
 
     def _ask_and_extend(self, first: int) -> int:
-        """Answer the kernel's questions by FCL until it has none."""
+        """Answer the kernel's questions by FCL until it has none, or the search is to stop."""
         status, answered = ASK, 0
-        while status == ASK:
+        while status == ASK and not self.should_stop(self.samples):
             x, y, theta = self._outcome[3:6].tolist()
             answered = self._map.answer(answered, x, y, theta)
             status = self._extend(first, answered)

@@ -63,11 +63,13 @@ class Equipment:
         model: packed model, see :func:`cbrrt_ompl.extension.pack_model`.
         clearance_map: decides its states.
         sampler: the sampler allocated last; None for OMPL's own planners.
+        should_stop: see :class:`ExtensionSampler`; given to the samplers allocated from now on.
     """
 
     model: NDArray[np.float64]
     clearance_map: ClearanceMap
     sampler: ExtensionSampler | None = None
+    should_stop: Callable[[int], bool] = lambda _: False
 
 
 def make_setup(scenario: Scenario, planner: str = "cb-rrt") -> Any:
@@ -147,6 +149,7 @@ def equip(si: Any, space: Any, scenario: Scenario, planner: str, clearance_map: 
 
         def allocate(owner: Any) -> ExtensionSampler:
             equipment.sampler = sampler_class(owner, space, equipment.model, clearance_map)
+            equipment.sampler.should_stop = equipment.should_stop
             return equipment.sampler
 
         si.setDirectedControlSamplerAllocator(oc.DirectedControlSamplerAllocator(allocate))
