@@ -250,7 +250,6 @@ class ClearanceMap:
         self._signed_clearance = CollisionChecker(world, Footprint.point()).signed_clearance
         bounds = world.bounds
         size = max(bounds.size)
-        self._smallest = 2.0 * SMALLEST_CELL
         inner = footprint.inscribed_radius + (CONTACT_TOLERANCE if footprint.is_round else 0.0)
         if footprint.inscribed_radius == 0.0 and not footprint.is_round:
             inner = -math.inf  # the origin is beside the footprint, and may well be inside an obstacle
@@ -374,30 +373,13 @@ class ClearanceMap:
 
     def _refine_disc(self, x: float, y: float, outer: float, inner: float) -> float:
         """Split the cells at a disc until it is decided, or cannot be; the certificate then."""
-        if not self._has_inside(x, y):
-            return UNDECIDED
-        view = self.children, self.clearances, self.frame
-        while self.cells + 4 <= MAX_CELLS:
-            cell, x_centre, y_centre, size = find_leaf_packed(*view, x, y)
-            if size < self._smallest or self._is_hopeless(cell, x, y, outer, inner):
-                break
-            self._split(cell, x_centre, y_centre, 0.25 * size)
-            view = self.children, self.clearances, self.frame
-            certificate = certify_disc_packed(*view, x, y, outer, inner)
-            if certificate != UNDECIDED:
+        while True:
+            certificate, cell, x_centre, y_centre, size = find_cell_to_split(
+                self.children, self.clearances, self.frame, x, y, outer, inner
+            )
+            if cell < 0 or self.cells + 4 > MAX_CELLS:
                 return certificate
-        return UNDECIDED
-
-    def _has_inside(self, x: float, y: float) -> bool:
-        """Whether a point is strictly inside the bounds."""
-        x_min, y_min, x_max, y_max = self.frame[:4].tolist()
-        return bool(x_min < x < x_max and y_min < y < y_max)
-
-    def _is_hopeless(self, cell: int, x: float, y: float, outer: float, inner: float) -> bool:
-        """Whether a disc is certainly cut by a surface between its two radii, so that no cell can decide it."""
-        x_asked, y_asked, clearance = self.clearances[cell].tolist()
-        distance = math.hypot(x - x_asked, y - y_asked)
-        return bool(inner <= clearance - distance and clearance + distance <= outer)
+            self._split(cell, x_centre, y_centre, 0.25 * size)
 
     def _split(self, cell: int, x: float, y: float, offset: float) -> None:
         """Give a leaf its four children, whose centres FCL measures."""
@@ -406,8 +388,9 @@ class ClearanceMap:
             capacity = min(2 * len(self.children) + 64, self._root + MAX_CELLS + 4)
             self.children = np.concatenate([self.children, np.zeros(capacity - first, dtype=np.int32)])
             self.clearances = np.concatenate([self.clearances, np.zeros((capacity - first, 3))])
-        for i, (dx, dy) in enumerate(((-1, -1), (1, -1), (-1, 1), (1, 1))):
-            self._ask_clearance(first + i, x + dx * offset, y + dy * offset)
+        left, right, below, above = x - offset, x + offset, y - offset, y + offset
+        centres = (left, below), (right, below), (left, above), (right, above)
+        self.clearances[first : first + 4] = [(*centre, self._signed_clearance(*centre)) for centre in centres]
         self._rows += 4
         self.children[cell] = first  # last, so that no reader ever meets a child without its clearance
 
@@ -476,7 +459,7 @@ def certify_parts_packed(
 
 
 @njit(cache=True)
-def certify_disc_packed(
+def find_cell_to_split(
     children: NDArray[np.int32],
     clearances: NDArray[np.float64],
     frame: NDArray[np.float64],
@@ -484,9 +467,34 @@ def certify_disc_packed(
     y: float,
     outer: float,
     inner: float,
-) -> float:
-    """:func:`certify_disc` for a caller in Python."""
-    return certify_disc(unpack_view(children, clearances, frame), x, y, outer, inner)
+) -> tuple[float, int, float, float, float]:
+    """The cell whose children may decide a disc that is not decided yet.
+
+    Args:
+        children: this and the next two: see :func:`unpack_view`.
+        clearances: see above.
+        frame: see above.
+        x: see :func:`certify_disc`; a centre outside the bounds is left undecided.
+        y: see above.
+        outer: see above.
+        inner: see above.
+
+    Returns:
+        The certificate; the row of the cell, -1 where the disc is decided or no cell can decide it, since it is
+        certainly cut by a surface between its two radii; and centre and side of the cell [m].
+    """
+    view = unpack_view(children, clearances, frame)
+    if not (view.x_min < x < view.x_max and view.y_min < y < view.y_max):
+        return UNDECIDED, -1, x, y, 0.0
+    certificate = certify_disc(view, x, y, outer, inner)
+    if certificate != UNDECIDED:
+        return certificate, -1, x, y, 0.0
+    cell, x_centre, y_centre, size = find_leaf(view, x, y)
+    dx, dy, clearance = x - clearances[cell, 0], y - clearances[cell, 1], clearances[cell, 2]
+    distance = math.sqrt(dx * dx + dy * dy)
+    if size < 2.0 * SMALLEST_CELL or (inner <= clearance - distance and clearance + distance <= outer):
+        return UNDECIDED, -1, x_centre, y_centre, size
+    return UNDECIDED, cell, x_centre, y_centre, size
 
 
 @njit(cache=True)
