@@ -82,7 +82,7 @@ class Drive:
         self._planning = self.settings.planning(scenario.planning)
         self._knowledge = Knowledge(known, self.hidden, self._robot.footprint)
         self._rng = np.random.default_rng(seed)
-        self._driven = [_at_start(scenario.start)]
+        self._driven, self._steps_driven = [_at_start(scenario.start)], 0
         self._plan: Trajectory | None = None  # the rest of it from now on; None while braking
         self._committed = self._driven[0].stopping_at(0.0, self._robot.limits, self._dt)
         self._failures = 0
@@ -96,7 +96,7 @@ class Drive:
     @property
     def time(self) -> float:
         """Time driven so far [s]."""
-        return self._dt * sum(len(piece) - 1 for piece in self._driven)
+        return self._dt * self._steps_driven
 
     @property
     def state(self) -> State:
@@ -156,6 +156,7 @@ class Drive:
                 self._committed = _part(self._committed, steps, None, self._dt)
                 self._failures += stands
         self._driven.append(piece)
+        self._steps_driven += len(piece) - 1
         elapsed = time.perf_counter() - began
         self.cycles.append(Cycle(looked_at, tuple(seen), replan, elapsed, self._plan is None))
 
