@@ -14,7 +14,9 @@ from cbrrt_ompl.robot import Footprint, Limits, Robot
 from cbrrt_ompl.scenario import Scenario
 from cbrrt_ompl.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.trajectory import Trajectory
-from cbrrt_ompl.verification import PROVEN_SHARE, RESOLUTION, verify
+from cbrrt_ompl.verification import verify
+from cbrrt_ompl.verification.sweep import PROVEN_SHARE
+from cbrrt_ompl.verification.verifying import RESOLUTION
 from cbrrt_ompl.world import World
 
 DT = 0.05
@@ -251,7 +253,8 @@ def test_rows_too_far_apart_to_be_checked_are_a_violation(v: float, omega: float
 def test_the_work_is_limited_and_what_it_did_not_reach_is_a_violation(
     honest: Trajectory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cbrrt_ompl.verification.MAX_CHECKS", 20)
+    for module in ("sweep", "collision_checks"):
+        monkeypatch.setattr(f"cbrrt_ompl.verification.{module}.MAX_CHECKS", 20)
     obstacle = Box((-3.0, -3.6), (-2.9, -3.5))
     result = verify(honest, scenario_for(honest, (obstacle,)))
     (violation,) = result.violations
