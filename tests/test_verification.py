@@ -15,12 +15,13 @@ from cbrrt_ompl.scenario import Scenario
 from cbrrt_ompl.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.trajectory import Trajectory
 from cbrrt_ompl.verification import verify
-from cbrrt_ompl.verification.sweep import PROVEN_SHARE
+from cbrrt_ompl.verification.sweep import PROVEN_SHARE, PURSUED_CHECKS
 from cbrrt_ompl.verification.verifying import RESOLUTION
 from cbrrt_ompl.world import World
 
 DT = 0.05
 LIMITS = Limits()
+BOUNDS = Bounds((-5.0, -5.0), (5.0, 5.0))
 START = State(-4.0, -4.0, 0.5)
 COMMANDS = ((1.0, 0.0, 3.0), (0.8, 0.5, 2.0), (0.0, 0.0, 2.0), (0.0, -0.5, 2.0), (0.0, 0.0, 1.0), (0.7, 0.2, 3.0))
 """(v, omega, duration): drive, turn left, stop, turn on the spot, stop turning, drive on."""
@@ -61,11 +62,12 @@ def scenario_for(
     limits: Limits = LIMITS,
     start: State = START,
     goal: Goal | None = None,
+    bounds: Bounds = BOUNDS,
 ) -> Scenario:
     """The scenario that a trajectory solves, if nothing else is given."""
     return Scenario(
         name="test",
-        world=World(Bounds((-5.0, -5.0), (5.0, 5.0)), obstacles),
+        world=World(bounds, obstacles),
         robot=Robot(footprint=Footprint.point() if footprint is None else footprint, limits=limits),
         start=start,
         goal=Goal(float(trajectory.x[-1]), float(trajectory.y[-1]), 0.2) if goal is None else goal,
@@ -261,6 +263,16 @@ def test_the_work_is_limited_and_what_it_did_not_reach_is_a_violation(
     assert violation.message.startswith("sampling: 20 states do not prove the motion free from t = ")
     assert 0.0 < violation.time < 5.0
     assert result.checks <= 40
+
+
+def test_a_long_way_close_to_a_wall_is_proven_though_a_tight_bound_would_take_too_long() -> None:
+    """All states were spent on a bound of 95 % of the clearance, and the motion was called unproven, so not valid."""
+    trajectory, start, wall = straight(100.0, 1.0), State(0.0, 0.0, 0.0, 1.0), Box((-1.0, 0.004), (101.0, 1.0))
+    bounds = Bounds((-2.0, -5.0), (102.0, 5.0))
+    result = verify(trajectory, scenario_for(trajectory, (wall,), start=start, bounds=bounds))
+    assert result.violations == ()
+    assert result.unproven == 0 and 0.0 < result.clearance_bound < PROVEN_SHARE * 0.004
+    assert result.checks < 4 * PURSUED_CHECKS
 
 
 def test_driving_along_a_wall_at_less_than_the_resolution_is_accepted_and_said() -> None:

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 PROVEN_SHARE = 0.95
 """The bound on the clearance is pursued until it is this share of the smallest clearance found."""
 
+PURSUED_CHECKS = 20_000
+"""States of a motion that FCL is asked about for that; a bound above 0 suffices afterwards."""
+
 MAX_CHECKS = 200_000
 """States of a motion that FCL is asked about at most: some seconds."""
 
@@ -72,7 +75,8 @@ def sweep(motion: Motion, checker: CollisionChecker, resolution: float) -> Sweep
         bounds = 0.5 * (margin + margin_end - ways)
         hits, free = (margin <= 0.0) & (margin_end <= 0.0), (margin > 0.0) & (margin_end > 0.0)
         short = ways <= resolution
-        settled = free & (bounds > 0.0) & (bounds >= PROVEN_SHARE * smallest) | short | hits & (end - begin <= 1.0)
+        wanted = PROVEN_SHARE * smallest if checks <= PURSUED_CHECKS else 0.0
+        settled = free & (bounds > 0.0) & (bounds >= wanted) | short | hits & (end - begin <= 1.0)
         bound = min(bound, float(bounds[settled].min(initial=math.inf)))
         unproven += int(np.count_nonzero(settled & free & (bounds <= 0.0)))
         begin, end, margin, margin_end = (values[~settled] for values in (begin, end, margin, margin_end))
