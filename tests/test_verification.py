@@ -405,6 +405,15 @@ def test_absurd_numbers_are_violations_not_crashes(honest: Trajectory, scenario:
         assert not verify(changed(honest, column, row, 1e308), scenario).ok
 
 
+def test_times_whose_differences_overflow_are_violations_not_crashes() -> None:
+    """A step of infinite duration made SciPy's integrator fail."""
+    zero = np.zeros(3)
+    for command in (0.0, 0.1):
+        wait = Trajectory(np.array([-1.7e308, 1.7e308, 1.75e308]), *[zero] * 5, zero + command, zero)
+        violations = verify(wait, scenario_for(wait, start=State(0.0, 0.0))).violations
+        assert {violation.kind for violation in violations} == {"sampling"} | ({"motion"} if command else set())
+
+
 @pytest.mark.parametrize("name", ["tolerance", "resolution"])
 @pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
 def test_a_tolerance_that_is_none_is_refused(honest: Trajectory, scenario: Scenario, name: str, value: float) -> None:

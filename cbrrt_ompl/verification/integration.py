@@ -28,7 +28,8 @@ def integrate_again(trajectory: Trajectory, velocities: NDArray[np.float64]) -> 
     """
     steps = np.diff(trajectory.t)
     count = len(steps)
-    v0, v1, w0, w1 = np.where(is_checkable(velocities, steps), velocities, 0.0)
+    checkable = is_checkable(velocities, steps)
+    steps, (v0, v1, w0, w1) = np.where(checkable, steps, 0.0), np.where(checkable, velocities, 0.0)
 
     def rates(share: float, pose: NDArray[np.float64]) -> NDArray[np.float64]:
         heading = pose[2 * count :]

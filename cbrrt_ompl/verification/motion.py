@@ -28,6 +28,8 @@ class Motion:
     """When the robot is at each pose, shape (n,) [s]."""
     poses: NDArray[np.float64]
     """The poses, shape (n, 3) [m, m, rad]."""
+    steps: NDArray[np.float64]
+    """Durations from pose to pose, 0 for steps that are left out, shape (n - 1,) [s]."""
     velocities: NDArray[np.float64]
     """v, v at the end, omega, omega at the end of each step, shape (4, n - 1) [m/s, rad/s]."""
     gaps: NDArray[np.float64]
@@ -52,12 +54,12 @@ class Motion:
         gaps[:, 2] = wrapped(gaps[:, 2])
         gap_ways = np.hypot(gaps[:, 0], gaps[:, 1]) + reach * np.abs(gaps[:, 2])
         checkable = is_checkable(velocities, steps) & (gap_ways <= LONGEST_WAY)
-        velocities = np.where(checkable, velocities, 0.0)
+        steps, velocities = np.where(checkable, steps, 0.0), np.where(checkable, velocities, 0.0)
         gaps, gap_ways = np.where(checkable[:, None], gaps, 0.0), np.where(checkable, gap_ways, 0.0)
         v0, v1, w0, w1 = np.abs(velocities)
         ways = 0.5 * steps * (v0 + v1 + reach * (w0 + w1)) + gap_ways
         ways = np.concatenate([[0.0], np.cumsum(ways)])
-        return cls(times, poses, velocities, gaps, gap_ways, reach, ways, ~checkable)
+        return cls(times, poses, steps, velocities, gaps, gap_ways, reach, ways, ~checkable)
 
     def _split(self, places: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Row before each place, and the share of the step from there that is behind it."""
@@ -75,7 +77,7 @@ class Motion:
         rows, share = self._split(places)
         v0, v1, w0, w1 = self.velocities[:, rows]
         v, omega = v0 + (v1 - v0) * share, w0 + (w1 - w0) * share
-        elapsed = share * (self.times[rows + 1] - self.times[rows])
+        elapsed = share * self.steps[rows]
         moved = displacement(self.poses[rows, 2], v0, v, w0, omega, elapsed) + share[:, None] * self.gaps[rows]
         return self.poses[rows] + moved
 
@@ -90,8 +92,7 @@ class Motion:
         speeds = [
             np.abs(v0 + (v1 - v0) * share) + self.reach * np.abs(w0 + (w1 - w0) * share) for share in (a, b)
         ]  # (2, m)
-        steps = self.times[rows + 1] - self.times[rows]
-        parts = (b - a) * (0.5 * steps * (speeds[0] + speeds[1]) + self.gap_ways[rows])
+        parts = (b - a) * (0.5 * self.steps[rows] * (speeds[0] + speeds[1]) + self.gap_ways[rows])
         whole = self.ways[end.astype(np.int64)] - self.ways[begin.astype(np.int64)]
         return np.where(end - begin > 1.0, whole, parts)
 

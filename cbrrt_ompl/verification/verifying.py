@@ -97,22 +97,22 @@ def verify(
             *sampling_violations(trajectory, motions.values(), sweeps.values()),
             *goal_violations(trajectory, scenario),
         )
-    nearest = min(sweeps.values(), key=lambda sweep: sweep.smallest_margin)
-    return Verification(
-        violations=violations,
-        smallest_clearance=checker.clearance(*nearest.pose),
-        smallest_clearance_time=nearest.time,
-        smallest_clearance_pose=nearest.pose,
-        clearance_bound=min(sweep.bound for sweep in sweeps.values()),
-        resolution=resolution,
-        unproven=sum(sweep.unproven for sweep in sweeps.values()),
-        tolerance=tolerance,
-        kinematic=trajectory.kinematic,
-        rows=len(trajectory),
-        duration=trajectory.duration,
-        checks=sum(sweep.checks for sweep in sweeps.values()),
-        hint=KINEMATIC_HINT if accelerations and _jumps_to_commands(trajectory) else "",
-    )
+        nearest = min(sweeps.values(), key=lambda sweep: sweep.smallest_margin)
+        return Verification(
+            violations=violations,
+            smallest_clearance=checker.clearance(*nearest.pose),
+            smallest_clearance_time=nearest.time,
+            smallest_clearance_pose=nearest.pose,
+            clearance_bound=min(sweep.bound for sweep in sweeps.values()),
+            resolution=resolution,
+            unproven=sum(sweep.unproven for sweep in sweeps.values()),
+            tolerance=tolerance,
+            kinematic=trajectory.kinematic,
+            rows=len(trajectory),
+            duration=trajectory.duration,
+            checks=sum(sweep.checks for sweep in sweeps.values()),
+            hint=KINEMATIC_HINT if accelerations and _jumps_to_commands(trajectory) else "",
+        )
 
 
 def _jumps_to_commands(trajectory: Trajectory) -> bool:
