@@ -50,15 +50,21 @@ def _ramp_together(trajectory: Trajectory, limits: Limits) -> NDArray[np.float64
 
     They approach the command along the straight line between them, as far as v, omega and either wheel get in a step.
     """
-    velocity = np.array([trajectory.v[0], trajectory.omega[0]])
-    ends = [velocity]
-    rates = np.array([limits.acceleration, limits.angular_acceleration, *2 * (limits.wheel_acceleration,)])
+    v, omega = float(trajectory.v[0]), float(trajectory.omega[0])
+    ends, half = [(v, omega)], 0.5 * limits.wheel_separation
     commands = np.column_stack([trajectory.v_command, trajectory.omega_command])
-    for command, step in zip(commands[:-1], np.diff(trajectory.t), strict=True):
-        change = command - velocity
-        duration = np.abs([*change, *wheel_speeds(change[0], change[1], limits)]) / rates
-        velocity = command if duration.max() <= step else velocity + change * (step / duration.max())
-        ends.append(velocity)
+    for (v_command, omega_command), step in zip(commands[:-1].tolist(), np.diff(trajectory.t).tolist(), strict=True):
+        change, turn = v_command - v, omega_command - omega
+        duration = max(
+            abs(change) / limits.acceleration,
+            abs(turn) / limits.angular_acceleration,
+            (abs(change) + half * abs(turn)) / limits.wheel_acceleration,
+        )
+        if duration <= step:
+            v, omega = v_command, omega_command
+        else:
+            v, omega = v + change * (step / duration), omega + turn * (step / duration)
+        ends.append((v, omega))
     return np.transpose(ends)
 
 
