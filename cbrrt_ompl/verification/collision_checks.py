@@ -9,7 +9,7 @@ import numpy as np
 
 from cbrrt_ompl.trajectory import Trajectory
 from cbrrt_ompl.verification.motion import LONGEST_TURN, LONGEST_WAY, Motion
-from cbrrt_ompl.verification.sweep import MAX_CHECKS, Sweep
+from cbrrt_ompl.verification.sweep import Sweep
 from cbrrt_ompl.verification.violation import Violation, place
 
 
@@ -41,7 +41,8 @@ def sampling_violations(
         if len(where) > 1:
             message += f" ({len(where)} steps, until t = {last:.6g} s)"
         yield Violation("sampling", first, message, len(where), last)
-    first = min(sweep.given_up_at for sweep in sweeps)
+    earliest = min(sweeps, key=lambda sweep: sweep.given_up_at)
+    first = earliest.given_up_at
     if first < math.inf:
-        message = f"sampling: {MAX_CHECKS} states do not prove the motion free from t = {first:.6g} s on"
+        message = f"sampling: {earliest.checks} states do not prove the motion free from t = {first:.6g} s on"
         yield Violation("sampling", first, message, last_time=float(trajectory.t[-1]))

@@ -10,7 +10,10 @@ from cbrrt_ompl.trajectory import Trajectory
 from cbrrt_ompl.verification.motion import is_checkable
 
 RELATIVE_ERROR, ABSOLUTE_ERROR = 1e-10, 1e-12
-"""What SciPy's integrator keeps its error below, relative and absolute [m, rad]."""
+"""What SciPy's integrator keeps its error below, relative and absolute [m, rad].
+
+It is the root mean square over all steps: each one by itself may be off by sqrt(3 n) times as much.
+"""
 
 
 def integrate_again(trajectory: Trajectory, velocities: NDArray[np.float64]) -> NDArray[np.float64]:
