@@ -171,6 +171,14 @@ def test_an_exceeded_limit_is_found_in_velocities_and_commands(limits: Limits, t
     assert violations[0].time == pytest.approx(violations[1].time + DT)
 
 
+def test_the_worst_value_is_that_furthest_out_of_its_range(honest: Trajectory, scenario: Scenario) -> None:
+    """It was the largest in magnitude, so 1.1 m/s where -0.5 m/s stood as well and the limits are 0 to 1 m/s."""
+    tampered = changed(changed(honest, "v_command", 0, 0.1), "v_command", 9, -1.5)
+    violation = next(violation for violation in verify(tampered, scenario).violations if violation.kind == "command")
+    assert "v_command = 1.1 m/s at t = 0 s" in violation.message
+    assert violation.message.endswith("(2 rows, until t = 0.45 s, worst -0.5)")
+
+
 def test_a_tampered_command_is_found_through_the_motion_it_would_cause(honest: Trajectory, scenario: Scenario) -> None:
     tampered = changed(honest, "v_command", 59, -1.0)
     result = verify(tampered, scenario)

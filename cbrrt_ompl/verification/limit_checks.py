@@ -28,9 +28,8 @@ def limit_violations(trajectory: Trajectory, limits: Limits) -> Iterator[Violati
             slack = _SLACK * max(-low, high)
             broken = ~((values >= low - slack) & (values <= high + slack))
             limit = f"limits {low:.6g} to {high:.6g} {UNITS[name]}"
-            yield from broken_condition(
-                kind, f"{name + suffix} = {{}} {UNITS[name]}", limit, values, broken, trajectory.t, "rows"
-            )
+            text, excess = f"{name + suffix} = {{}} {UNITS[name]}", np.maximum(low - values, values - high)
+            yield from broken_condition(kind, text, limit, values, broken, trajectory.t, "rows", excess)
 
 
 def acceleration_violations(trajectory: Trajectory, limits: Limits) -> Iterator[Violation]:

@@ -40,6 +40,7 @@ def broken_condition(
     broken: NDArray[np.bool_],
     times: NDArray[np.float64],
     noun: str,
+    excess: ArrayLike | None = None,
 ) -> Iterator[Violation]:
     """The violation of one condition, if there is one.
 
@@ -51,6 +52,7 @@ def broken_condition(
         broken: where the condition is broken, shape (n,).
         times: when, shape (n,) [s].
         noun: what is counted.
+        excess: how far the figures are off, shape (n,); their magnitudes if not given.
     """
     where = np.flatnonzero(broken)
     if not len(where):
@@ -59,8 +61,8 @@ def broken_condition(
     first, last = float(times[where[0]]), float(times[where[-1]])
     message = f"{kind}: {text.format(f'{found[0]:.6g}')} at t = {first:.6g} s, {limit}"
     if len(where) > 1:
-        extreme = found[np.argmax(np.abs(found))]
-        message += f" ({len(where)} {noun}, until t = {last:.6g} s, worst {extreme:.6g})"
+        worst = found[np.argmax(np.abs(found) if excess is None else np.asarray(excess)[where])]
+        message += f" ({len(where)} {noun}, until t = {last:.6g} s, worst {worst:.6g})"
     yield Violation(kind, first, message, len(where), last)
 
 
