@@ -292,6 +292,7 @@ def test_driving_along_a_wall_at_less_than_the_resolution_is_accepted_and_said()
     assert result.unproven > 100 and -0.5 * RESOLUTION < result.clearance_bound < 0.0
     text = f"intervals of at most 0.0001 m accepted for their free ends: {result.unproven}"
     assert text in result.summary().splitlines()[-2]
+    assert result.summary().endswith("; not proven to be above 0 everywhere")
     finer = verify(trajectory, scenario_for(trajectory, (wall,), start=start), resolution=1e-5)
     assert finer.unproven == 0 and 0.0 < finer.clearance_bound <= 2e-5
 
@@ -444,6 +445,13 @@ def test_the_summary_says_what_was_checked_with_which_tolerance(honest: Trajecto
 def test_the_summary_of_a_kinematic_trajectory_says_that_accelerations_were_not_checked() -> None:
     trajectory = drive(kinematic=True)
     assert "accelerations not checked" in verify(trajectory, scenario_for(trajectory)).summary()
+
+
+@pytest.mark.parametrize("moved", ["into a wall", "too far to be checked"])
+def test_the_summary_claims_no_bound_where_none_is_proven(honest: Trajectory, scenario: Scenario, moved: str) -> None:
+    """It said "proven not to fall below -0.02 m", or "-inf m"."""
+    tampered = changed(honest, "x", 100, 20.0 if moved == "into a wall" else 1e7)
+    assert verify(tampered, scenario).summary().endswith("; not proven to be above 0 everywhere")
 
 
 def test_the_summary_of_a_failure_lists_every_violation(honest: Trajectory, scenario: Scenario) -> None:

@@ -53,6 +53,11 @@ class Verification:
             if self.kinematic
             else "velocities, commands and accelerations within the limits"
         )
+        bound = (
+            f"proven not to fall below {self.clearance_bound:.4g} m"
+            if self.clearance_bound > 0.0
+            else "not proven to be above 0 everywhere"
+        )
         lines = [
             f"trajectory of {self.rows} rows, {self.duration:g} s: {verdict}",
             *(f"  {violation.message}" for violation in self.violations),
@@ -66,6 +71,6 @@ class Verification:
             f"  at {self.checks} states and the way between them; "
             f"intervals of at most {self.resolution:g} m accepted for their free ends: {self.unproven}",
             f"smallest clearance: {self.smallest_clearance:.4g} m at t = {self.smallest_clearance_time:.6g} s, "
-            f"at {place(self.smallest_clearance_pose)}; proven not to fall below {self.clearance_bound:.4g} m",
+            f"at {place(self.smallest_clearance_pose)}; {bound}",
         ]
         return "\n".join(lines)
