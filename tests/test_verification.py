@@ -110,6 +110,15 @@ def test_a_trajectory_of_one_row_is_valid_where_the_start_is_in_the_goal() -> No
     assert verify(stay, scenario_for(stay)).ok
 
 
+def test_steps_of_unlike_durations_are_each_driven_for_their_own() -> None:
+    t = np.concatenate([[-3.0], -3.0 + np.cumsum([1e-4, 2.0, 0.03, 1e-6, 0.7])])
+    rows, turn = np.ones(6), 0.4 * (t - t[0])
+    arc = Trajectory(t, np.sin(turn), 1.0 - np.cos(turn), turn, 0.4 * rows, 0.4 * rows, 0.4 * rows, 0.4 * rows)
+    scenario = scenario_for(arc, start=State(0.0, 0.0, 0.0, 0.4, 0.4))
+    assert verify(arc, scenario, tolerance=1e-9).ok
+    assert kinds(changed(arc, "t", 2, 0.01), scenario) == {"motion"}
+
+
 def test_headings_are_compared_through_the_wrap() -> None:
     start = State(0.0, 0.0, 3.0)
     circle = drive(start=start, commands=((0.3, 0.5, 14.0),))
@@ -306,12 +315,13 @@ def test_a_corner_between_two_rows_is_found_down_to_the_resolution() -> None:
 
 
 @pytest.mark.parametrize("kinematic", [False, True])
-def test_the_motion_is_proven_where_the_robot_turns_and_its_corners_sweep(kinematic: bool) -> None:
-    """The clearance of a bar that turns on the spot, between rows at which it is free."""
+@pytest.mark.parametrize("rear", [-0.05, 0.5])
+def test_the_motion_is_proven_where_the_robot_turns_and_its_corners_sweep(kinematic: bool, rear: float) -> None:
+    """The clearance of a bar that turns about a point in it or behind it, between rows at which it is free."""
     t = np.array([0.0, 2.0])
     zero, rate = np.zeros(2), np.full(2, 0.5)
     turn = Trajectory(t, zero, zero, np.array([0.0, 1.0]), zero, rate, zero, rate, kinematic=kinematic)
-    bar, start = Footprint.polygon([(-0.05, -0.05), (1.0, -0.05), (1.0, 0.05), (-0.05, 0.05)]), State(0, 0, 0, 0, 0.5)
+    bar, start = Footprint.polygon([(rear, -0.05), (1.0, -0.05), (1.0, 0.05), (rear, 0.05)]), State(0, 0, 0, 0, 0.5)
     place = 0.98 * np.array([math.cos(0.5), math.sin(0.5)])
     pin = Disc((float(place[0]), float(place[1])), 0.01)
     assert verify(turn, scenario_for(turn, (), bar, start=start)).ok
