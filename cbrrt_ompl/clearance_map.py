@@ -231,7 +231,7 @@ class ClearanceMap:
         clearances: see :class:`MapView`; replaced when the map grows.
         frame: the other numbers of the view, shape (FRAME_SIZE,).
         answers: FCL's answers of the present extension, rows of (x, y, theta, margin) and a number
-            of :func:`cbrrt_ompl.extension.find_answer`'s, shape (n, 5).
+            of :func:`cbrrt_ompl.motion_check.find_answer`'s, shape (n, 5).
         exact_queries: states that FCL had to decide with the real footprint.
     """
 

@@ -263,7 +263,7 @@ def draw_extension(
         The axes.
     """
     from cbrrt_ompl.control_laws import reference_pose  # here, since a figure of a world needs no kernels
-    from cbrrt_ompl.extension import STEERING, law_of, pack_model
+    from cbrrt_ompl.motion_model import STEERING, law_of, pack_model
     from cbrrt_ompl.replay import extension_trajectories
 
     law = law_of(planner, planning)

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from cbrrt_ompl.clearance_map import clearance_map_for
-from cbrrt_ompl.compiled.search import ROBUST, Search
+from cbrrt_ompl.compiled.search import COMPILED_PLANNERS, ROBUST, Search
 from cbrrt_ompl.errors import Problem, SettingsError, UnknownPlannerError
-from cbrrt_ompl.extension import COMPILED_PLANNERS, check_step, law_of, pack_model
+from cbrrt_ompl.motion_model import check_step, law_of, pack_model
 from cbrrt_ompl.replay import trajectory_from_controls
 from cbrrt_ompl.scenario import Scenario, check_scenario
 from cbrrt_ompl.sections import is_number

@@ -7,7 +7,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cbrrt_ompl.control_laws import reference_pose
-from cbrrt_ompl.extension import CANDIDATES, STEERING, advance, candidate, unpack_model
+from cbrrt_ompl.extension import CANDIDATES, candidate
+from cbrrt_ompl.motion_model import STEERING, advance, unpack_model
 from cbrrt_ompl.settings import State
 from cbrrt_ompl.trajectory import Trajectory
 from cbrrt_ompl.tree import Tree
@@ -23,7 +24,7 @@ def trajectory_from_controls(
 
     Args:
         start: (x, y, theta, v, omega), shape (5,).
-        controls: a control a row, see :func:`cbrrt_ompl.extension.advance`, shape (n, 3).
+        controls: a control a row, see :func:`cbrrt_ompl.motion_model.advance`, shape (n, 3).
         steps: integration steps of each control, shape (n,).
         model: packed model that the controls were made for.
 

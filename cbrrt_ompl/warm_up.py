@@ -8,7 +8,7 @@ import numpy as np
 
 from cbrrt_ompl.clearance_map import ClearanceMap
 from cbrrt_ompl.compiled.search import Search
-from cbrrt_ompl.extension import OPEN_LOOP, pack_model
+from cbrrt_ompl.motion_model import OPEN_LOOP, pack_model
 from cbrrt_ompl.robot import Footprint, Robot
 from cbrrt_ompl.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.world import Bounds, World

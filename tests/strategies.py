@@ -11,6 +11,8 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
+from cbrrt_ompl.robot import Limits
+
 NUMBERS: SearchStrategy[Any] = st.one_of(
     st.floats(-10.0, 10.0),
     st.integers(-10, 10),
@@ -46,6 +48,26 @@ RINGS = st.one_of(
 
 ANYTHING: SearchStrategy[Any] = st.one_of(NUMBERS, OTHERS, POINTS, RINGS, st.lists(NUMBERS | OTHERS, max_size=3))
 """What a caller may hand over by mistake."""
+
+SIZES = st.floats(0.05, 5.0)
+SHARES = st.floats(0.0, 1.0)
+
+LIMITS: SearchStrategy[Limits] = st.builds(
+    Limits,
+    st.floats(-2.0, 0.0),
+    SIZES,
+    st.floats(-4.0, -0.05),
+    SIZES,
+    SIZES,
+    SIZES,
+    SIZES,
+    SIZES | st.just(math.inf),
+    SIZES | st.just(math.inf),
+)
+"""Limits of robots of all kinds."""
+
+WHEELED: SearchStrategy[Limits] = LIMITS.filter(lambda limits: limits.has_wheel_limits)
+"""Limits of robots whose wheels are limited."""
 
 
 @st.composite

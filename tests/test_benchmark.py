@@ -35,7 +35,7 @@ from cbrrt_ompl.benchmark.local import run_locally
 from cbrrt_ompl.benchmark.log import Log, PlannerLog, format_log, merge_logs, parse_log, read_log
 from cbrrt_ompl.cli import main
 from cbrrt_ompl.errors import CbrrtError, InputError, SettingsError, UnknownPlannerError
-from cbrrt_ompl.extension import OPEN_LOOP, STEERING
+from cbrrt_ompl.motion_model import OPEN_LOOP, STEERING
 from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
 from cbrrt_ompl.ompl_plugin.samplers import ExtensionSampler
 from cbrrt_ompl.planning import PLANNERS

@@ -17,7 +17,7 @@ from cbrrt_ompl import load_scenario, make_setup, plan, verify
 from cbrrt_ompl.clearance_map import ClearanceMap
 from cbrrt_ompl.compiled.planner import CompiledPlanner
 from cbrrt_ompl.compiled.search import Search
-from cbrrt_ompl.extension import law_of, pack_model
+from cbrrt_ompl.motion_model import law_of, pack_model
 from cbrrt_ompl.obstacles import Bounds, Box
 from cbrrt_ompl.ompl_plugin.binding import ob, oc, ot, ou
 from cbrrt_ompl.robot import Limits, Robot

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from kernels import plain
 
 from cbrrt_ompl.control_laws import (
     error_posture,
@@ -29,11 +28,6 @@ poses = st.tuples(coordinates, coordinates, headings)
 gains = st.builds(Gains, st.floats(0.0, 5.0), st.floats(0.0, 5.0), st.floats(0.0, 5.0))
 PAPER = Gains()
 LIMITS = Limits()
-
-
-def plain(kernel: Callable[..., Any]) -> Callable[..., Any]:
-    """The Python function behind a kernel."""
-    return getattr(kernel, "py_func", kernel)  # with NUMBA_DISABLE_JIT=1 a kernel is that function itself
 
 
 def turn_between(a: float, b: float) -> float:

@@ -14,12 +14,10 @@ from hypothesis import strategies as st
 from cbrrt_ompl.clearance_map import ClearanceMap, clearance_map_for, extend_map
 from cbrrt_ompl.drive import Drive, DriveResult, DriveSettings, drive
 from cbrrt_ompl.drive.knowledge import Knowledge
-from cbrrt_ompl.drive.motion_check import is_free
 from cbrrt_ompl.drive.settings import grown, needed_range, stopping_distance
 from cbrrt_ompl.drive.unknown import load_obstacles, random_obstacles, unknown_obstacles
 from cbrrt_ompl.errors import InputError, ScenarioError, SettingsError
 from cbrrt_ompl.obstacles import Bounds, Box, Disc, Obstacle, OrientedBox, Polygon, signed_distance
-from cbrrt_ompl.planning import plan
 from cbrrt_ompl.robot import Footprint, Limits, Robot
 from cbrrt_ompl.scenario import Scenario
 from cbrrt_ompl.settings import Goal, PlanningSettings, State
@@ -242,32 +240,6 @@ def test_signed_distances_are_those_of_fcl(obstacle: Obstacle, points: list[tupl
         else:
             assert far.signed_clearance(*point) <= 1e-6
             assert far.collides(Footprint.point(), (*point, 0.0))
-
-
-@pytest.mark.parametrize("robot", [ROUND, OBLONG], ids=["round", "oblong"])
-def test_the_check_of_a_motion_accepts_every_plan(robot: Robot) -> None:
-    scenario = hall(*WALL_WITH_GAP, robot=robot)
-    for seed in range(5):
-        found = plan(scenario, "cb-rrt-robust", seed=seed).trajectory
-        assert found is not None
-        assert is_free(found.states, 0.05, ClearanceMap(scenario.world, robot.footprint))
-
-
-@given(st.floats(0.001, 7.999), st.floats(0.0, 6.28))
-def test_the_check_of_a_motion_sees_a_thin_wall_between_two_rows(x: float, angle: float) -> None:
-    """The wall is 1.1 mm thick, and the steps are 5 cm long."""
-    state = State(4.0 - math.cos(angle), 2.0 - math.sin(angle), angle, 1.0)
-    steps = np.arange(41) * 0.05
-    rows = [[state.x + math.cos(angle) * s, state.y + math.sin(angle) * s, angle, 1.0, 0.0] for s in steps]
-    wall = OrientedBox((4.0 + 0.01 * x * math.cos(angle), 2.0 + 0.01 * x * math.sin(angle)), (0.0011, 1.0), angle)
-    for obstacles, free in ((), True), ((wall,), False):
-        assert is_free(np.array(rows), 0.05, ClearanceMap(World(HALL, obstacles), Footprint.point())) == free
-
-
-def test_a_motion_that_begins_in_an_obstacle_is_not_free() -> None:
-    rows = np.array([[4.2, 2.0, 0.0, 0.0, 0.0]])
-    for robot in (ROUND, OBLONG):
-        assert not is_free(rows, 0.05, ClearanceMap(World(HALL, [BOX_AHEAD]), robot.footprint))
 
 
 def test_a_grown_footprint_keeps_the_margin() -> None:

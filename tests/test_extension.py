@@ -3,215 +3,38 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
-
-from cbrrt_ompl import clearance_map as clearance_map_module
-from cbrrt_ompl.clearance_map import ROOM, ClearanceMap
-from cbrrt_ompl.compiled.search import Search
-from cbrrt_ompl.control_laws import reference_pose, tracking_command
-from cbrrt_ompl.errors import SettingsError
-from cbrrt_ompl.extension import (
-    ASK,
-    BLOCKED,
-    CLOSED_LOOP,
-    EXTENDED,
-    OPEN_LOOP,
-    REFUSED,
-    SCRATCH_SHAPE,
-    STEERING,
-    Extension,
-    GoalRegion,
-    check_step,
-    extend,
-    in_goal,
-    is_refused,
-    law_of,
-    pack_model,
-    unpack_model,
+from kernels import (
+    FOOTPRINTS,
+    LAWS,
+    LIMITS,
+    POINT,
+    RATES,
+    WIDE,
+    crowded_world,
+    drive,
+    free_nodes,
+    model_of,
+    nodes,
+    plain,
+    samples,
+    states_of,
 )
-from cbrrt_ompl.kinematics import dynamic_step, unicycle_step
-from cbrrt_ompl.obstacles import Bounds, Box, Disc, OrientedBox, Polygon
-from cbrrt_ompl.replay import replay_path
-from cbrrt_ompl.robot import Footprint, Gains, Limits, Robot
-from cbrrt_ompl.settings import Goal, PlanningSettings, State
+
+from cbrrt_ompl.clearance_map import ClearanceMap
+from cbrrt_ompl.control_laws import reference_pose, tracking_command
+from cbrrt_ompl.extension import EXTENDED, REFUSED, extend, is_refused
+from cbrrt_ompl.kinematics import dynamic_step
+from cbrrt_ompl.motion_check import BLOCKED
+from cbrrt_ompl.motion_model import CLOSED_LOOP, OPEN_LOOP, STEERING, in_goal, unpack_model
+from cbrrt_ompl.obstacles import Bounds, Box
+from cbrrt_ompl.robot import Footprint, Gains
+from cbrrt_ompl.settings import Goal, State
 from cbrrt_ompl.world import World
-
-LAWS = {"open loop": OPEN_LOOP, "closed loop": CLOSED_LOOP, "steering": STEERING}
-LIMITS = Limits()
-RATES = (LIMITS.omega_min, 0.0, LIMITS.omega_max)
-OUT_OF_REACH = Goal(90.0, 90.0, tolerance=0.1)
-POINT = Footprint.point()
-FOOTPRINTS = {
-    "point": POINT,
-    "disc": Footprint.disc(0.15),
-    "rectangle": Footprint.polygon([(-0.2, -0.1), (0.3, -0.1), (0.3, 0.1), (-0.2, 0.1)]),
-}
-WIDE = ClearanceMap(World(Bounds((-100.0, -100.0), (100.0, 100.0))), POINT)
-
-coordinates = st.floats(-2.0, 2.0)
-headings = st.floats(-math.pi, math.pi, exclude_max=True)
-nodes = st.builds(State, coordinates, coordinates, headings, st.floats(0.0, 1.0), st.floats(*RATES[::2]))
-samples = st.tuples(st.floats(-4.0, 4.0), st.floats(-4.0, 4.0))
-
-
-def plain(kernel: Callable[..., Any]) -> Callable[..., Any]:
-    """The Python function behind a kernel."""
-    return getattr(kernel, "py_func", kernel)  # with NUMBA_DISABLE_JIT=1 a kernel is that function itself
-
-
-def model_of(law: int = OPEN_LOOP, goal: Goal = OUT_OF_REACH, **planning: Any) -> NDArray[np.float64]:
-    """The paper's robot as a packed model."""
-    return pack_model(law, Robot(), goal, PlanningSettings(**planning))
-
-
-def drive(
-    clearance_map: ClearanceMap,
-    node: Sequence[float],
-    sample: tuple[float, float],
-    model: NDArray[np.float64],
-    children: Sequence[tuple[float, float]] = (),
-    kernel: Callable[..., Extension] = extend,
-) -> Extension:
-    """One extension, all its questions answered; ``children`` are the commands that the node has used."""
-    following = np.arange(-1, len(children), dtype=np.int32)
-    commands = np.array([*children, (0.0, 0.0)])
-    node, answered = tuple(map(float, node)), 0
-    for _ in range(10_000):
-        found = kernel(
-            node,
-            *sample,
-            len(children) - 1,
-            following,
-            commands,
-            unpack_model(model),
-            clearance_map.view,
-            clearance_map.answers,
-            answered,
-            np.empty(SCRATCH_SHAPE),
-        )
-        if found.outcome != ASK:
-            return found
-        answered = clearance_map.answer(answered, *found.control)
-    raise AssertionError("there is no end to the questions")
-
-
-def states_of(node: Sequence[float], found: Extension, model: NDArray[np.float64]) -> NDArray[np.float64]:
-    """States of an extension from its node on, shape (steps + 1, 5)."""
-    return replay_path(np.array(node, dtype=float), np.array([found.control]), np.array([found.steps]), model)[0]
-
-
-def between(a: NDArray[np.float64], b: NDArray[np.float64], share: float, model: NDArray[np.float64]) -> list[float]:
-    """Pose at a share of the step between two states."""
-    v, omega = b[3:] if int(model[0]) == STEERING else a[3:]
-    v_there, omega_there = v + share * (b[3] - v), omega + share * (b[4] - omega)
-    return list(unicycle_step(*a[:3], v, omega, v_there, omega_there, share * model[1]))
-
-
-class TestModel:
-    @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-    def test_it_survives_packing(self, law: int) -> None:
-        limits = Limits(-0.1, 1.1, -0.2, 1.2, 0.3, 1.3, 0.4, 1.4, 0.5)
-        robot = Robot(limits=limits, gains=Gains(1.0, 2.0, 3.0))
-        goal = Goal(1.5, 2.5, 0.4, theta=0.7, heading_tolerance=0.2, speed_tolerance=0.1)
-        planning = PlanningSettings(
-            horizon=1.2, step=0.04, cut_extension="keep", equal_control_tolerance=0.07, look_ahead=1.7
-        )
-        model = unpack_model(pack_model(law, robot, goal, planning))
-        assert (model.law, model.dt, model.steps, model.look_ahead) == (law, 0.04, 30, 1.7)
-        assert (model.equal_control_tolerance, model.keep_cut) == (0.07, True)
-        assert (model.limits, model.gains) == (limits, robot.gains)
-        assert model.goal == (1.5, 2.5, 0.4, 0.7, 0.2, 0.1)
-
-    def test_what_the_goal_leaves_free_has_an_infinite_tolerance(self) -> None:
-        model = unpack_model(model_of(goal=Goal(1.0, 2.0)))
-        assert (model.goal.heading_tolerance, model.goal.speed_tolerance) == (math.inf, math.inf)
-        assert not model.keep_cut
-        assert model.look_ahead == 2.0
-
-    @pytest.mark.parametrize(
-        ("planner", "closed_loop", "law"),
-        [
-            ("cb-rrt", False, OPEN_LOOP),
-            ("cb-rrt", True, CLOSED_LOOP),
-            ("cb-rrt-compiled", True, CLOSED_LOOP),
-            ("s-rrt", False, STEERING),
-            ("s-rrt-compiled", True, STEERING),
-            ("kpiece1", True, OPEN_LOOP),
-        ],
-    )
-    def test_every_planner_has_its_law(self, planner: str, closed_loop: bool, law: int) -> None:
-        assert law_of(planner, PlanningSettings(closed_loop=closed_loop)) == law
-
-    def test_a_step_in_which_the_robot_could_turn_too_far_is_refused(self) -> None:
-        robot = Robot(limits=Limits(omega_min=-4.0, omega_max=1.0))
-        check_step(robot, PlanningSettings(step=0.125))
-        with pytest.raises(SettingsError, match=r"planning\.step: got 0\.13, expected at most 0\.125 s") as error:
-            check_step(robot, PlanningSettings(step=0.13))
-        assert [problem.field for problem in error.value.problems] == ["planning.step"]
-
-    def test_a_step_that_is_accepted_has_an_error_below_a_hundred_thousandth_of_its_length(self) -> None:
-        """From full right to full left in one step: the worst that a robot of such an acceleration can do."""
-        omega, dt = 0.8, 0.05
-        limits = Limits(omega_min=-omega, omega_max=omega, angular_acceleration=2.0 * omega / dt)
-        with pytest.raises(SettingsError, match=r"planning\.step: got 0\.06, expected at most 0\.05 s"):
-            check_step(Robot(limits=limits), PlanningSettings(step=0.06, horizon=0.6))
-        check_step(Robot(limits=limits), PlanningSettings(step=dt))
-        x, y, _ = unicycle_step(0.0, 0.0, 0.0, 1.0, -omega, 1.0, omega, dt)
-        t = (np.arange(10_000) + 0.5) / 10_000 * dt
-        heading = -omega * t + omega * t * t / dt
-        assert math.hypot(x - dt * np.cos(heading).mean(), y - dt * np.sin(heading).mean()) < 1e-5 * dt
-
-
-class TestGoalRegion:
-    goals = st.builds(
-        Goal,
-        coordinates,
-        coordinates,
-        st.floats(0.1, 1.0),
-        st.none() | st.floats(-10.0, 10.0),
-        st.floats(0.01, 4.0),
-        st.none() | st.floats(0.01, 1.0),
-    )
-
-    @given(goals, st.data())
-    def test_it_is_that_of_the_goal_with_its_border(self, goal: Goal, data: st.DataObject) -> None:
-        direction = data.draw(st.floats(0.0, 6.0))
-        distance = goal.tolerance * data.draw(st.floats(0.0, 0.999999) | st.floats(1.000001, 2.0))
-        turns = st.sampled_from([-1.0, 0.0, 1.0]).map(lambda k: k * goal.heading_tolerance) | st.floats(-20.0, 20.0)
-        most = goal.speed_tolerance or 0.3
-        speeds = st.sampled_from([-most, most, math.nextafter(most, 2.0)]) | st.floats(-0.5, 0.5)
-        state = State(
-            goal.x + distance * math.cos(direction),
-            goal.y + distance * math.sin(direction),
-            (goal.theta or 0.0) + data.draw(turns),
-            data.draw(speeds),
-            data.draw(speeds),
-        )
-        region = unpack_model(model_of(goal=goal)).goal
-        assert in_goal(region, *state) == (not goal.violations(state))
-        assert plain(in_goal)(region, *state) == in_goal(region, *state)
-
-    @pytest.mark.parametrize("direction", [(1.0, 0.0), (0.0, -1.0)])
-    def test_the_rim_of_the_disc_is_outside(self, direction: tuple[float, float]) -> None:
-        region = GoalRegion(0.0, 0.0, 0.5, 0.0, math.inf, math.inf)
-        for radius, is_inside in ((0.5, False), (math.nextafter(0.5, 0.0), True)):
-            assert in_goal(region, radius * direction[0], radius * direction[1], 3.0, 1.0, 1.0) is is_inside
-
-    def test_the_rim_is_the_same_to_the_last_bit(self) -> None:
-        rng = np.random.default_rng(0)
-        for x, y in rng.uniform(-1.0, 1.0, (2000, 2)).tolist():
-            for radius in (math.hypot(x, y), math.sqrt(x * x + y * y)):
-                goal = Goal(0.0, 0.0, radius)
-                assert in_goal(unpack_model(model_of(goal=goal)).goal, x, y, 0.0, 0.0, 0.0) == (
-                    not goal.violations(State(x, y))
-                )
 
 
 class TestRefusal:
@@ -403,154 +226,6 @@ class TestObstacles:
         kept = drive(ClearanceMap(world, long), node, sample, model_of(cut_extension="keep"))
         assert kept.state[:2] == (0.0, 0.0)
         assert kept.state[2] == pytest.approx(math.asin(0.1 / 0.26**0.5) - math.asin(0.3 / 0.26**0.5), abs=0.027)
-
-    @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-    @pytest.mark.parametrize("cut", ["discard", "keep"])
-    @given(
-        node=nodes,
-        sample=samples,
-        shape=st.sampled_from(list(FOOTPRINTS)),
-        at=st.integers(0, 39),
-        share=st.floats(0.0, 1.0),
-        angle=headings,
-        length=st.sampled_from([0.001, 0.05, 1.0, 30.0]),
-        enabled=st.booleans(),
-    )
-    @settings(max_examples=60)
-    def test_a_wall_of_a_millimetre_is_never_passed(
-        self,
-        law: int,
-        cut: str,
-        node: State,
-        sample: tuple[float, float],
-        shape: str,
-        at: int,
-        share: float,
-        angle: float,
-        length: float,
-        enabled: bool,
-    ) -> None:
-        """The wall stands across the way that is driven without it, at any angle, between any two steps."""
-        model = model_of(law, cut_extension=cut)
-        free = drive(WIDE, node, sample, model)
-        states = states_of(node, free, model)
-        x, y, _ = between(states[at], states[at + 1], share, model)
-        world = World(Bounds((-20.0, -20.0), (20.0, 20.0)), [OrientedBox((x, y), (length, 0.001), angle)])
-        assume(not world.collides(FOOTPRINTS[shape], node[:3]))
-        others = [(1.0, rate) for rate in RATES if law == STEERING and rate != free.command[1]]
-        found = drive(ClearanceMap(world, FOOTPRINTS[shape], enabled=enabled), node, sample, model, others)
-        if cut == "discard" or found.steps == 0:
-            assert (found.outcome, found.steps) == (BLOCKED, 0)
-        else:
-            assert found.steps <= at
-            assert found.state == tuple(states[found.steps])
-
-    @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-    @pytest.mark.parametrize("angle", [0.0, 0.3, math.pi / 2.0, 2.0])
-    def test_no_tree_grows_through_a_wall_of_a_millimetre(self, law: int, angle: float) -> None:
-        world = World(Bounds((-4.0, -4.0), (4.0, 4.0)), [OrientedBox((0.0, 0.0), (20.0, 0.001), angle)])
-        normal = np.array([-math.sin(angle), math.cos(angle)])
-        model = model_of(law, cut_extension="keep", horizon=0.5)
-        search = Search(model, ClearanceMap(world, POINT), [State(*(-2.0 * normal), angle)], seed=3)
-        search.run(lambda _: False, 3000)
-        sides = search.edges()[0][:, :2] @ normal
-        assert search.nodes > 200
-        assert sides.max() < -0.0005
-        assert sides.max() > -0.06  # the wall was reached
-
-
-def crowded_world() -> World:
-    return World(
-        Bounds((-2.0, -2.0), (2.0, 2.0)),
-        [
-            Box((-1.0, -1.2), (-0.8, 0.8)),
-            Disc((0.3, 0.9), 0.35),
-            OrientedBox((0.8, -0.8), (0.9, 0.05), 0.6),
-            Polygon(np.array([(1.2, 0.2), (1.8, 0.3), (1.5, 0.5), (1.7, 1.2)])),
-            Polygon(np.array([(-0.4, -1.7), (0.3, -1.5), (-0.2, -0.9)])),
-        ],
-    )
-
-
-def free_nodes(world: World, footprint: Footprint, count: int, seed: int) -> list[State]:
-    """Random states at which nothing is touched, at random velocities."""
-    rng = np.random.default_rng(seed)
-    low, high = (-2.0, -2.0, -math.pi, 0.0, LIMITS.omega_min), (2.0, 2.0, math.pi, 1.0, LIMITS.omega_max)
-    drawn = (State(*rng.uniform(low, high).tolist()) for _ in range(100 * count))
-    return [node for node in drawn if not world.collides(footprint, node[:3])][:count]
-
-
-@pytest.mark.parametrize("footprint", FOOTPRINTS.values(), ids=FOOTPRINTS)
-@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-class TestWhatTheMapHolds:
-    """What is accepted depends on the points of the way alone: not on the map, and not on whether there is one."""
-
-    @pytest.mark.parametrize("cut", ["discard", "keep"])
-    def test_an_extension_ends_at_the_same_bits(self, footprint: Footprint, law: int, cut: str) -> None:
-        world, rng = crowded_world(), np.random.default_rng(8)
-        model = model_of(law, Goal(0.5, 0.2, 0.2), cut_extension=cut)
-        off, grown = ClearanceMap(world, footprint, enabled=False), ClearanceMap(world, footprint)
-        for pose in rng.uniform((-2.0, -2.0, -math.pi), (2.0, 2.0, math.pi), (1500, 3)).tolist():
-            grown.collides(*pose)
-        outcomes = []
-        for node in free_nodes(world, footprint, 60, seed=9):
-            sample = tuple(rng.uniform(-2.0, 2.0, 2).tolist())
-            exact = drive(off, node, sample, model)
-            for clearance_map in (grown, ClearanceMap(world, footprint)):
-                found = drive(clearance_map, node, sample, model)
-                assert found[:3] == exact[:3]
-                assert exact.outcome == BLOCKED or found == exact
-            outcomes.append(exact.outcome)
-        assert outcomes.count(EXTENDED) >= 10
-        assert outcomes.count(BLOCKED) >= 10 or cut == "keep"
-
-    def test_a_full_map_changes_nothing(self, footprint: Footprint, law: int, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(clearance_map_module, "MAX_CELLS", 21)
-        world, rng = crowded_world(), np.random.default_rng(10)
-        off, full = ClearanceMap(world, footprint, enabled=False), ClearanceMap(world, footprint)
-        for node in free_nodes(world, footprint, 40, seed=11):
-            sample = tuple(rng.uniform(-2.0, 2.0, 2).tolist())
-            assert drive(full, node, sample, model_of(law))[:3] == drive(off, node, sample, model_of(law))[:3]
-        assert full.cells == 21
-
-    def test_a_tree_grows_the_same_node_by_node(self, footprint: Footprint, law: int) -> None:
-        world = crowded_world()
-        model, grown, trees = model_of(law, horizon=0.5, cut_extension="keep"), ClearanceMap(world, footprint), []
-        for clearance_map in (grown, grown, ClearanceMap(world, footprint, enabled=False)):
-            search = Search(model, clearance_map, [State(-1.5, 0.0, 1.5)], seed=5)
-            search.run(lambda _: False, 300)
-            trees.append(search.edges())
-        assert len(trees[0][0]) > 20
-        for tree in trees[1:]:
-            assert all(np.array_equal(a, b) for a, b in zip(trees[0], tree, strict=True))
-
-    @pytest.mark.parametrize("cut", ["discard", "keep"])
-    def test_every_way_is_free_between_its_steps_too(self, footprint: Footprint, law: int, cut: str) -> None:
-        world, rng = crowded_world(), np.random.default_rng(12)
-        clearance_map, collides = ClearanceMap(world, footprint), world.checker(footprint).collides
-        model, longest = model_of(law, cut_extension=cut), 0
-        for node in free_nodes(world, footprint, 40, seed=13):
-            found = drive(clearance_map, node, tuple(rng.uniform(-2.0, 2.0, 2).tolist()), model)
-            if found.outcome == EXTENDED:
-                longest = max(longest, found.steps)
-                states = states_of(node, found, model)
-                for a, b in zip(states[:-1], states[1:], strict=True):
-                    assert not collides(*b[:3])
-                    assert not collides(*between(a, b, 0.5, model))
-        assert longest == 40
-
-    def test_a_kept_way_cannot_be_driven_a_step_further(self, footprint: Footprint, law: int) -> None:
-        world, rng = crowded_world(), np.random.default_rng(14)
-        clearance_map, margin = ClearanceMap(world, footprint), world.checker(footprint).margin
-        model, cut = model_of(law, cut_extension="keep"), 0
-        for node in free_nodes(world, footprint, 40, seed=15):
-            found = drive(clearance_map, node, tuple(rng.uniform(-2.0, 2.0, 2).tolist()), model)
-            if found.outcome != EXTENDED or found.steps == 40:
-                continue
-            cut += 1
-            a, b = states_of(node, found._replace(steps=found.steps + 1), model)[-2:]
-            assert min(margin(*between(a, b, share, model)) for share in np.linspace(0.005, 1.0, 200)) < 1.1 * ROOM
-        assert cut >= 5
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)

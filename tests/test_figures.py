@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from kernels import OUT_OF_REACH, WIDE, drive
 from matplotlib import pyplot
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection, PolyCollection
@@ -19,9 +20,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Wedge
 from matplotlib.patches import Polygon as PolygonPatch
 from numpy.typing import NDArray
-from test_extension import OUT_OF_REACH, WIDE, drive
 
-from cbrrt_ompl.extension import OPEN_LOOP, STEERING, pack_model
 from cbrrt_ompl.figures import (
     PATH_COLOR,
     TREE_COLOR,
@@ -34,6 +33,7 @@ from cbrrt_ompl.figures import (
     draw_velocities,
     draw_world,
 )
+from cbrrt_ompl.motion_model import OPEN_LOOP, STEERING, pack_model
 from cbrrt_ompl.obstacles import Bounds, Box, Disc, Obstacle, Polygon
 from cbrrt_ompl.planning import PlanResult
 from cbrrt_ompl.robot import Footprint, Limits, Robot

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import SHARES, WHEELED
 
 from cbrrt_ompl import clearance_map
 from cbrrt_ompl.clearance_map import (
@@ -23,7 +24,6 @@ from cbrrt_ompl.clearance_map import (
 )
 from cbrrt_ompl.compiled.search import Search
 from cbrrt_ompl.disc_tree import disc_tree
-from cbrrt_ompl.extension import OPEN_LOOP, pack_model
 from cbrrt_ompl.kinematics import (
     dynamic_step,
     joint_ramp,
@@ -35,26 +35,13 @@ from cbrrt_ompl.kinematics import (
     unicycle_step,
 )
 from cbrrt_ompl.manoeuvres import BRAKE, FORWARD, REVERSE, approach_command, has_ended, is_manoeuvre, most_steps
+from cbrrt_ompl.motion_model import OPEN_LOOP, pack_model
 from cbrrt_ompl.obstacles import Bounds, Box, Disc
 from cbrrt_ompl.robot import Footprint, Limits, Robot
 from cbrrt_ompl.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.world import World
 
 DT = 0.05
-sizes = st.floats(0.05, 5.0)
-shares = st.floats(0.0, 1.0)
-wheeled = st.builds(
-    Limits,
-    st.floats(-2.0, 0.0),
-    sizes,
-    st.floats(-4.0, -0.05),
-    sizes,
-    sizes,
-    sizes,
-    sizes,
-    st.one_of(sizes, st.just(math.inf)),
-    st.one_of(sizes, st.just(math.inf)),
-).filter(lambda limits: limits.has_wheel_limits)
 EITHER = Limits(-0.6, 1.0, -2.0, 3.0, 0.9, 2.5, wheel_separation=0.4, wheel_speed=0.5, wheel_acceleration=0.7)
 """The wheels are what limits driving straight on and, to the left alone, turning on the spot."""
 
@@ -82,13 +69,13 @@ class TestPureLimits:
         limits = Limits(-0.3, 1.0, -0.4, 0.6, 0.9, 2.5, wheel_separation=0.4)
         assert pure_limits(limits) == limits
 
-    @given(wheeled)
+    @given(WHEELED)
     def test_the_wheels_can_drive_straight_on_and_turn_on_the_spot_as_fast(self, limits: Limits) -> None:
         pure = pure_limits(limits)
         for command in [(pure.v_min, 0.0), (pure.v_max, 0.0), (0.0, pure.omega_min), (0.0, pure.omega_max)]:
             assert saturate(*command, limits) == command
 
-    @given(wheeled)
+    @given(WHEELED)
     def test_nothing_faster_would_do(self, limits: Limits) -> None:
         pure, arm = pure_limits(limits), 0.5 * limits.wheel_separation
         assert pure.v_max == min(limits.v_max, limits.wheel_speed)
@@ -96,7 +83,7 @@ class TestPureLimits:
         assert pure.omega_max == pytest.approx(min(limits.omega_max, limits.wheel_speed / arm), rel=1e-14)
         assert pure.omega_min == pytest.approx(max(limits.omega_min, -limits.wheel_speed / arm), rel=1e-14)
 
-    @given(wheeled)
+    @given(WHEELED)
     def test_a_pure_ramp_takes_a_second_to_its_acceleration(self, limits: Limits) -> None:
         pure = pure_limits(limits)
         assert joint_ramp_time(pure.acceleration, 0.0, limits) == pytest.approx(1.0, rel=1e-14)
@@ -104,7 +91,7 @@ class TestPureLimits:
 
 
 class TestStoppingTime:
-    @given(wheeled, shares, shares)
+    @given(WHEELED, SHARES, SHARES)
     def test_a_robot_with_wheel_limits_brakes_for_so_long(self, limits: Limits, v_share: float, turn: float) -> None:
         v = limits.v_min + v_share * (limits.v_max - limits.v_min)
         omega = limits.omega_min + turn * (limits.omega_max - limits.omega_min)
@@ -130,7 +117,7 @@ class TestJointSteps:
     def test_ramp_times_by_hand(self, command: tuple[float, float], time: float) -> None:
         assert joint_ramp_time(*command, EITHER) == pytest.approx(time, rel=1e-14)
 
-    @given(wheeled, shares, shares, st.floats(-2.0, 2.0), st.floats(-3.0, 3.0))
+    @given(WHEELED, SHARES, SHARES, st.floats(-2.0, 2.0), st.floats(-3.0, 3.0))
     def test_a_dynamic_step_of_a_robot_with_wheel_limits_ramps_both_velocities_jointly(
         self, limits: Limits, v_share: float, turn: float, v_command: float, omega_command: float
     ) -> None:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from kernels import plain
 
 from cbrrt_ompl.kinematics import clamp, dynamic_step, kinematic_step, ramp, unicycle_step, wrap_angle
 from cbrrt_ompl.robot import Limits
@@ -27,11 +26,6 @@ LIMITS = Limits()
 
 ACCELERATED = [(0.7, 0.6, 0.5, 0.5), (0.5, -0.6, -1.0, 2.0), (0.1, 3.0, 0.8, -2.5), (1.0, 0.0, 0.0, 3.0)]
 """v, its acceleration, omega and its acceleration in the middle of a step."""
-
-
-def plain(kernel: Callable[..., Any]) -> Callable[..., Any]:
-    """The Python function behind a kernel."""
-    return getattr(kernel, "py_func", kernel)  # with NUMBA_DISABLE_JIT=1 a kernel is that function itself
 
 
 def turn_between(a: float, b: float) -> float:

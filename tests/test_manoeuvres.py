@@ -12,9 +12,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from cbrrt_ompl import load_scenario, make_setup, plan, verify
-from cbrrt_ompl.extension import OPEN_LOOP, STEERING, pack_model
 from cbrrt_ompl.kinematics import dynamic_step, saturate
 from cbrrt_ompl.manoeuvres import BRAKE, FORWARD, REVERSE, has_ended, most_steps, next_velocity
+from cbrrt_ompl.motion_model import OPEN_LOOP, STEERING, pack_model
 from cbrrt_ompl.obstacles import Bounds, Box
 from cbrrt_ompl.ompl_plugin.binding import ob
 from cbrrt_ompl.replay import trajectory_from_controls

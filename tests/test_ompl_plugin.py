@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from cbrrt_ompl import load_scenario, make_setup, plan
 from cbrrt_ompl.clearance_map import ClearanceMap
 from cbrrt_ompl.errors import UnknownPlannerError
-from cbrrt_ompl.extension import GoalRegion, in_goal
+from cbrrt_ompl.motion_model import GoalRegion, in_goal
 from cbrrt_ompl.obstacles import Bounds, Box
 from cbrrt_ompl.ompl_plugin.binding import ob, oc, ou
 from cbrrt_ompl.ompl_plugin.goals import PoseGoal, make_goal

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from cbrrt_ompl.clearance_map import ClearanceMap
 from cbrrt_ompl.compiled.search import Search
 from cbrrt_ompl.control_laws import tracking_command
-from cbrrt_ompl.extension import CLOSED_LOOP, OPEN_LOOP, STEERING, pack_model
 from cbrrt_ompl.kinematics import dynamic_step, kinematic_step
+from cbrrt_ompl.motion_model import CLOSED_LOOP, OPEN_LOOP, STEERING, pack_model
 from cbrrt_ompl.obstacles import Bounds, Disc
 from cbrrt_ompl.replay import replay_edges, replay_path, trajectory_from_controls, tree_from_controls
 from cbrrt_ompl.robot import Footprint, Gains, Limits, Robot

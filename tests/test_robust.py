@@ -28,7 +28,7 @@ from cbrrt_ompl.compiled.growth import bearable_failures
 from cbrrt_ompl.compiled.nearest import BRUTE_FORCE, GRID, KD_TREE, Index, insert, nearest
 from cbrrt_ompl.compiled.planner import CompiledPlanner
 from cbrrt_ompl.compiled.search import Search
-from cbrrt_ompl.extension import law_of, pack_model
+from cbrrt_ompl.motion_model import law_of, pack_model
 from cbrrt_ompl.settings import NEAREST_NEIGHBOUR
 
 ROBUST = "cb-rrt-robust"

@@ -8,21 +8,12 @@ import numpy as np
 import pytest
 
 from cbrrt_ompl.clearance_map import ClearanceMap
-from cbrrt_ompl.extension import (
-    ASK,
-    BLOCKED,
-    CLOSED_LOOP,
-    EXTENDED,
-    OPEN_LOOP,
-    SCRATCH_SHAPE,
-    STEERING,
-    pack_model,
-    roll_out,
-    unpack_model,
-)
+from cbrrt_ompl.motion_check import ASK, BLOCKED, FREE
+from cbrrt_ompl.motion_model import CLOSED_LOOP, OPEN_LOOP, STEERING, pack_model, unpack_model
 from cbrrt_ompl.obstacles import Bounds, OrientedBox
 from cbrrt_ompl.planning import plan
 from cbrrt_ompl.robot import Footprint, Limits, Robot
+from cbrrt_ompl.roll_out import SCRATCH_SHAPE, roll_out
 from cbrrt_ompl.scenario import Scenario
 from cbrrt_ompl.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.world import World
@@ -68,7 +59,7 @@ def test_no_extension_drives_through_it(law: int, footprint: Footprint) -> None:
     for heading, tilt, distance in zip(
         rng.uniform(-math.pi, math.pi, 100), rng.uniform(-1.3, 1.3, 100), rng.uniform(0.7, 1.9, 100), strict=True
     ):
-        assert driven_straight(law, footprint, None, heading) == (EXTENDED, pytest.approx(2.0))
+        assert driven_straight(law, footprint, None, heading) == (FREE, pytest.approx(2.0))
         wall = wall_through(distance * math.cos(heading), distance * math.sin(heading), heading + tilt)
         outcome, way = driven_straight(law, footprint, wall, heading)
         assert outcome == BLOCKED and way < distance

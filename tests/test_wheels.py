@@ -10,45 +10,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from strategies import LIMITS, SHARES, WHEELED
 
 from cbrrt_ompl import ROBOTS, plan, verify
 from cbrrt_ompl.control_laws import tracking_command
 from cbrrt_ompl.errors import RobotError, ScenarioError
-from cbrrt_ompl.extension import (
-    CLOSED_LOOP,
-    OPEN_LOOP,
-    SCRATCH_SHAPE,
-    STEERING,
-    advance,
-    integrate_block,
-    pack_model,
-    unpack_model,
-)
 from cbrrt_ompl.kinematics import dynamic_step, has_wheel_limits, joint_ramp, ramp, saturate
+from cbrrt_ompl.motion_model import CLOSED_LOOP, OPEN_LOOP, STEERING, advance, pack_model, unpack_model
 from cbrrt_ompl.obstacles import Bounds, Box
 from cbrrt_ompl.robot import Gains, Limits, Robot
+from cbrrt_ompl.roll_out import SCRATCH_SHAPE, integrate_block
 from cbrrt_ompl.scenario import Scenario
 from cbrrt_ompl.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.trajectory import Trajectory
 from cbrrt_ompl.world import World
 
 DT = 0.05
-sizes = st.floats(0.05, 5.0)
-shares = st.floats(0.0, 1.0)
-finite_or_not = st.one_of(sizes, st.just(math.inf))
-all_limits = st.builds(
-    Limits,
-    st.floats(-2.0, 0.0),
-    sizes,
-    st.floats(-4.0, -0.05),
-    sizes,
-    sizes,
-    sizes,
-    sizes,
-    finite_or_not,
-    finite_or_not,
-)
-wheeled = all_limits.filter(lambda limits: limits.has_wheel_limits)
 velocities = st.tuples(st.floats(-6.0, 6.0), st.floats(-6.0, 6.0))
 
 SLOW_WHEELS = Limits(0.0, 0.5, -2.0, 2.0, 0.8, 3.0, wheel_separation=0.4, wheel_speed=0.5, wheel_acceleration=0.7)
@@ -108,22 +85,22 @@ def test_a_separation_alone_limits_nothing() -> None:
 
 
 class TestSaturation:
-    @given(wheeled, velocities)
+    @given(WHEELED, velocities)
     def test_no_wheel_is_asked_for_more_than_it_can(self, limits: Limits, command: tuple[float, float]) -> None:
         assert rim(*saturate(*command, limits), limits) <= limits.wheel_speed * (1.0 + 1e-14)
 
-    @given(wheeled, velocities)
+    @given(WHEELED, velocities)
     def test_it_leaves_the_arc_as_it_is(self, limits: Limits, command: tuple[float, float]) -> None:
         v, omega = saturate(*command, limits)
         assert v * command[1] == pytest.approx(omega * command[0], rel=1e-14)
         assert v * command[0] >= 0.0 and omega * command[1] >= 0.0
 
-    @given(wheeled, velocities)
+    @given(WHEELED, velocities)
     def test_a_second_time_changes_nothing(self, limits: Limits, command: tuple[float, float]) -> None:
         once = saturate(*command, limits)
         assert saturate(*once, limits) == once
 
-    @given(wheeled, velocities)
+    @given(WHEELED, velocities)
     def test_what_the_wheels_can_do_is_left_alone_and_what_not_is_done_as_fast_as_they_can(
         self, limits: Limits, command: tuple[float, float]
     ) -> None:
@@ -133,7 +110,7 @@ class TestSaturation:
         else:
             assert rim(*found, limits) == pytest.approx(limits.wheel_speed, rel=1e-14)
 
-    @given(wheeled, st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
+    @given(WHEELED, st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
     def test_commands_of_the_tracking_law_are_saturated(self, limits: Limits, x: float, y: float) -> None:
         v, omega = tracking_command(0.0, 0.0, 0.3, (x, y, math.atan2(y, x)), limits, Gains(1.5, 10.0, 3.0))
         assert rim(v, omega, limits) <= limits.wheel_speed * (1.0 + 1e-14)
@@ -141,7 +118,7 @@ class TestSaturation:
 
 
 class TestJointRamp:
-    @given(wheeled, shares, shares, shares, shares)
+    @given(WHEELED, SHARES, SHARES, SHARES, SHARES)
     def test_it_keeps_all_limits_and_reaches_the_command(
         self, limits: Limits, a: float, b: float, c: float, d: float
     ) -> None:
@@ -161,7 +138,7 @@ class TestJointRamp:
             assert rim(*velocity, limits) <= limits.wheel_speed * (1.0 + 1e-14)
         assert velocity == command
 
-    @given(wheeled, velocities, velocities)
+    @given(WHEELED, velocities, velocities)
     def test_both_velocities_change_by_the_same_share(
         self, limits: Limits, velocity: tuple[float, float], command: tuple[float, float]
     ) -> None:
@@ -169,7 +146,7 @@ class TestJointRamp:
         done = (v - velocity[0]) * (command[1] - velocity[1])
         assert done == pytest.approx((omega - velocity[1]) * (command[0] - velocity[0]), rel=1e-9, abs=1e-12)
 
-    @given(wheeled, velocities, velocities)
+    @given(WHEELED, velocities, velocities)
     def test_one_of_the_limits_is_used_up_until_the_command_is_reached(
         self, limits: Limits, velocity: tuple[float, float], command: tuple[float, float]
     ) -> None:
@@ -179,7 +156,7 @@ class TestJointRamp:
         most = max(*used, (dv + 0.5 * limits.wheel_separation * domega) / limits.wheel_acceleration)
         assert found == command or most == pytest.approx(DT, rel=1e-9)
 
-    @given(all_limits, velocities, velocities)
+    @given(LIMITS, velocities, velocities)
     def test_a_step_of_a_robot_without_wheel_limits_ramps_as_in_the_paper(
         self, limits: Limits, velocity: tuple[float, float], command: tuple[float, float]
     ) -> None:
@@ -190,7 +167,7 @@ class TestJointRamp:
 
 
 @pytest.mark.parametrize("law", [OPEN_LOOP, STEERING])
-@given(limits=all_limits, start=st.tuples(shares, shares), command=velocities, theta=st.floats(-3.0, 3.0))
+@given(limits=LIMITS, start=st.tuples(SHARES, SHARES), command=velocities, theta=st.floats(-3.0, 3.0))
 @settings(max_examples=60)
 def test_a_block_is_its_single_steps_bit_for_bit(
     law: int, limits: Limits, start: tuple[float, float], command: tuple[float, float], theta: float

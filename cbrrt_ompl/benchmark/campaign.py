@@ -18,8 +18,8 @@ from cbrrt_ompl.benchmark.database import check_replaceable, write_database
 from cbrrt_ompl.benchmark.local import run_locally
 from cbrrt_ompl.benchmark.log import Log, format_log, merge_logs, read_log
 from cbrrt_ompl.errors import CbrrtError, InputError, Problem, SettingsError, UnknownPlannerError
-from cbrrt_ompl.extension import check_step
 from cbrrt_ompl.files import write_file
+from cbrrt_ompl.motion_model import check_step
 from cbrrt_ompl.planning import PLANNERS
 from cbrrt_ompl.scenario import Scenario, load_scenario, scenario_to_dict
 

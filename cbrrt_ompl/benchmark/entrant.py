@@ -10,7 +10,7 @@ from typing import Any
 from cbrrt_ompl.clearance_map import ClearanceMap
 from cbrrt_ompl.compiled.growth import REFUSALS
 from cbrrt_ompl.compiled.planner import CompiledPlanner
-from cbrrt_ompl.extension import COMPILED_PLANNERS
+from cbrrt_ompl.compiled.search import COMPILED_PLANNERS
 from cbrrt_ompl.ompl_plugin.binding import ob, ou
 from cbrrt_ompl.ompl_plugin.setup import (
     Equipment,

@@ -16,7 +16,7 @@ from cbrrt_ompl.benchmark.entrant import Entrant
 from cbrrt_ompl.benchmark.log import Log, PlannerLog, read_log
 from cbrrt_ompl.clearance_map import ClearanceMap, clearance_map_for
 from cbrrt_ompl.errors import InputError, Problem, SettingsError, UnknownPlannerError
-from cbrrt_ompl.extension import CLOSED_LOOP, law_of
+from cbrrt_ompl.motion_model import CLOSED_LOOP, law_of
 from cbrrt_ompl.obstacles import Bounds
 from cbrrt_ompl.ompl_plugin.binding import ot, ou
 from cbrrt_ompl.ompl_plugin.results import trajectory_from_path

@@ -12,7 +12,7 @@ from typing import Any
 def warm_up(planner: str) -> None:
     """Load the kernels of a planner, and say so on a terminal where they must be compiled first."""
     from cbrrt_ompl import warm_up as kernels
-    from cbrrt_ompl.extension import COMPILED_PLANNERS
+    from cbrrt_ompl.compiled.search import COMPILED_PLANNERS
 
     message = "cbrrt: compiling the planners, once after installation ..."
     timer = threading.Timer(1.0, print, [message], {"file": sys.stderr, "flush": True})

@@ -15,19 +15,10 @@ from numpy.typing import NDArray
 
 from cbrrt_ompl.clearance_map import unpack_view
 from cbrrt_ompl.compiled.nearest import KD_TREE, Index, insert, nearest
-from cbrrt_ompl.extension import (
-    ASK,
-    BLOCKED,
-    CLOSED_LOOP,
-    EXTENDED,
-    NO_CHILD,
-    REFUSED,
-    UNTRIED,
-    extend,
-    in_goal,
-    unpack_model,
-)
+from cbrrt_ompl.extension import EXTENDED, NO_CHILD, REFUSED, UNTRIED, extend
 from cbrrt_ompl.manoeuvres import is_manoeuvre
+from cbrrt_ompl.motion_check import ASK, BLOCKED
+from cbrrt_ompl.motion_model import CLOSED_LOOP, in_goal, unpack_model
 
 REACHED, WANT_ANSWER, WANT_ROOM, WANT_DRAWS, PAUSED = 0, 1, 2, 3, 4
 """Why the loop returns: a node in the goal, a question to FCL, full arrays, no random numbers left, enough for now."""
@@ -190,7 +181,7 @@ def grow(
         stack: room for the k-d tree's search.
         kind: of the index.
         cell: side of a cell of the grid [m].
-        packed_model: see :func:`cbrrt_ompl.extension.pack_model`.
+        packed_model: see :func:`cbrrt_ompl.motion_model.pack_model`.
         goal_bias: share of samples that are the goal.
         children: this and the next two: the clearance map.
         clearances: see above.
@@ -201,7 +192,7 @@ def grow(
         counters: see `NODES`; carried from call to call, shape (COUNTERS,).
         last_sample: number of samples to pause at.
         question: takes the pose that FCL must decide, shape (3,).
-        scratch: room for a block of steps, see :mod:`cbrrt_ompl.extension`.
+        scratch: room for a block of steps, see :mod:`cbrrt_ompl.roll_out`.
 
     Returns:
         `REACHED` (the last node is in the goal), `WANT_ANSWER`, `WANT_ROOM`, `WANT_DRAWS` or `PAUSED`. After a question

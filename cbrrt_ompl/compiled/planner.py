@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cbrrt_ompl.clearance_map import ClearanceMap
 from cbrrt_ompl.compiled.search import ROBUST, Search
-from cbrrt_ompl.extension import law_of, pack_model
+from cbrrt_ompl.motion_model import law_of, pack_model
 from cbrrt_ompl.ompl_plugin.binding import ob, oc
 from cbrrt_ompl.ompl_plugin.reals import StateReals
 from cbrrt_ompl.ompl_plugin.space import STATE_DIMENSION, set_state

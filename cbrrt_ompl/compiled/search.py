@@ -28,8 +28,9 @@ from cbrrt_ompl.compiled.growth import (
     rebuild_index,
 )
 from cbrrt_ompl.compiled.nearest import GRID, KD_TREE, KINDS, Index
-from cbrrt_ompl.extension import CLOSED_LOOP, SCRATCH_SHAPE
+from cbrrt_ompl.motion_model import CLOSED_LOOP
 from cbrrt_ompl.replay import trajectory_from_controls, tree_from_controls
+from cbrrt_ompl.roll_out import SCRATCH_SHAPE
 from cbrrt_ompl.settings import State
 from cbrrt_ompl.trajectory import Trajectory
 from cbrrt_ompl.tree import Tree
@@ -45,6 +46,9 @@ FIRST_CAPACITY = 256
 
 ROBUST = "cb-rrt-robust"
 """Name of the planner whose search is robust."""
+
+COMPILED_PLANNERS = ("cb-rrt-compiled", "s-rrt-compiled", ROBUST)
+"""Planners that are one compiled loop and need no OMPL."""
 
 
 class Search:
@@ -70,7 +74,7 @@ class Search:
         """Plant the start states.
 
         Args:
-            model: packed model, see :func:`cbrrt_ompl.extension.pack_model`.
+            model: packed model, see :func:`cbrrt_ompl.motion_model.pack_model`.
             clearance_map: decides the states.
             starts: states of the roots.
             seed: of the search's own generator; None draws a fresh one.

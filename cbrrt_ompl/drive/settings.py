@@ -10,8 +10,8 @@ import numpy as np
 import shapely
 
 from cbrrt_ompl.errors import Problem, SettingsError
-from cbrrt_ompl.extension import STEERING, law_of
 from cbrrt_ompl.kinematics import brake
+from cbrrt_ompl.motion_model import STEERING, law_of
 from cbrrt_ompl.planning import PLANNERS
 from cbrrt_ompl.robot import Footprint, Robot
 from cbrrt_ompl.settings import MAX_STEPS, PlanningSettings

@@ -18,12 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cbrrt_ompl.clearance_map import clearance_map_for
+from cbrrt_ompl.compiled.search import COMPILED_PLANNERS
 from cbrrt_ompl.drive.knowledge import Knowledge
-from cbrrt_ompl.drive.motion_check import is_free
 from cbrrt_ompl.drive.result import LATE, NO_ROOM, REACHED, STOPPED, UNSAFE, Cycle, DriveResult, Replan
 from cbrrt_ompl.drive.settings import DriveSettings, grown, needed_range
 from cbrrt_ompl.errors import Problem, ScenarioError, SettingsError
-from cbrrt_ompl.extension import COMPILED_PLANNERS
+from cbrrt_ompl.motion_check import is_free
 from cbrrt_ompl.obstacles import Obstacle
 from cbrrt_ompl.planning import plan
 from cbrrt_ompl.scenario import Scenario

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.extension import control_dimension
+from cbrrt_ompl.motion_model import control_dimension
 from cbrrt_ompl.ompl_plugin.binding import oc, ou
 from cbrrt_ompl.replay import trajectory_from_controls, tree_from_controls
 from cbrrt_ompl.trajectory import Trajectory

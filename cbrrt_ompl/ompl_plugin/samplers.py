@@ -10,20 +10,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cbrrt_ompl.clearance_map import ClearanceMap, unpack_view
-from cbrrt_ompl.extension import (
-    ASK,
-    EXTENDED,
-    NO_CHILD,
-    REFUSED,
-    SCRATCH_SHAPE,
-    UNTRIED,
-    control_dimension,
-    extend,
-    unpack_model,
-)
+from cbrrt_ompl.extension import EXTENDED, NO_CHILD, REFUSED, UNTRIED, extend
+from cbrrt_ompl.motion_check import ASK
+from cbrrt_ompl.motion_model import control_dimension, unpack_model
 from cbrrt_ompl.ompl_plugin.binding import oc
 from cbrrt_ompl.ompl_plugin.reals import StateReals
 from cbrrt_ompl.ompl_plugin.space import STATE_DIMENSION
+from cbrrt_ompl.roll_out import SCRATCH_SHAPE
 
 
 class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL has no type information
@@ -47,7 +40,7 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         Args:
             si: the space information that allocates this sampler.
             space: its state space. (References to ``si`` itself would make a cycle that Python cannot see.)
-            model: packed model, see :func:`cbrrt_ompl.extension.pack_model`.
+            model: packed model, see :func:`cbrrt_ompl.motion_model.pack_model`.
             clearance_map: decides the states.
         """
         super().__init__(si)

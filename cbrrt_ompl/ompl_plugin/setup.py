@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cbrrt_ompl.clearance_map import ClearanceMap
+from cbrrt_ompl.compiled.search import COMPILED_PLANNERS
 from cbrrt_ompl.errors import UnknownPlannerError
-from cbrrt_ompl.extension import CLOSED_LOOP, COMPILED_PLANNERS, check_step, law_of, pack_model
+from cbrrt_ompl.motion_model import CLOSED_LOOP, check_step, law_of, pack_model
 from cbrrt_ompl.ompl_plugin.binding import ob, oc
 from cbrrt_ompl.ompl_plugin.decomposition import PositionDecomposition
 from cbrrt_ompl.ompl_plugin.goals import make_goal
@@ -60,7 +61,7 @@ class Equipment:
     """What one planner was given: its model, its map and, once it has begun, its sampler.
 
     Attributes:
-        model: packed model, see :func:`cbrrt_ompl.extension.pack_model`.
+        model: packed model, see :func:`cbrrt_ompl.motion_model.pack_model`.
         clearance_map: decides its states.
         sampler: the sampler allocated last; None for OMPL's own planners.
         should_stop: see :class:`ExtensionSampler`; given to the samplers allocated from now on.

@@ -1,0 +1,115 @@
+"""Kernels as tests call them: the Python behind one, and extensions of the paper's robot, all questions answered."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from cbrrt_ompl.clearance_map import ClearanceMap
+from cbrrt_ompl.extension import Extension, extend
+from cbrrt_ompl.kinematics import unicycle_step
+from cbrrt_ompl.motion_check import ASK
+from cbrrt_ompl.motion_model import CLOSED_LOOP, OPEN_LOOP, STEERING, pack_model, unpack_model
+from cbrrt_ompl.obstacles import Bounds, Box, Disc, OrientedBox, Polygon
+from cbrrt_ompl.replay import replay_path
+from cbrrt_ompl.robot import Footprint, Limits, Robot
+from cbrrt_ompl.roll_out import SCRATCH_SHAPE
+from cbrrt_ompl.settings import Goal, PlanningSettings, State
+from cbrrt_ompl.world import World
+
+LAWS = {"open loop": OPEN_LOOP, "closed loop": CLOSED_LOOP, "steering": STEERING}
+LIMITS = Limits()
+RATES = (LIMITS.omega_min, 0.0, LIMITS.omega_max)
+OUT_OF_REACH = Goal(90.0, 90.0, tolerance=0.1)
+POINT = Footprint.point()
+FOOTPRINTS = {
+    "point": POINT,
+    "disc": Footprint.disc(0.15),
+    "rectangle": Footprint.polygon([(-0.2, -0.1), (0.3, -0.1), (0.3, 0.1), (-0.2, 0.1)]),
+}
+WIDE = ClearanceMap(World(Bounds((-100.0, -100.0), (100.0, 100.0))), POINT)
+
+coordinates = st.floats(-2.0, 2.0)
+headings = st.floats(-math.pi, math.pi, exclude_max=True)
+nodes = st.builds(State, coordinates, coordinates, headings, st.floats(0.0, 1.0), st.floats(*RATES[::2]))
+samples = st.tuples(st.floats(-4.0, 4.0), st.floats(-4.0, 4.0))
+
+
+def plain(kernel: Callable[..., Any]) -> Callable[..., Any]:
+    """The Python function behind a kernel."""
+    return getattr(kernel, "py_func", kernel)  # with NUMBA_DISABLE_JIT=1 a kernel is that function itself
+
+
+def model_of(law: int = OPEN_LOOP, goal: Goal = OUT_OF_REACH, **planning: Any) -> NDArray[np.float64]:
+    """The paper's robot as a packed model."""
+    return pack_model(law, Robot(), goal, PlanningSettings(**planning))
+
+
+def drive(
+    clearance_map: ClearanceMap,
+    node: Sequence[float],
+    sample: tuple[float, float],
+    model: NDArray[np.float64],
+    children: Sequence[tuple[float, float]] = (),
+    kernel: Callable[..., Extension] = extend,
+) -> Extension:
+    """One extension, all its questions answered; ``children`` are the commands that the node has used."""
+    following = np.arange(-1, len(children), dtype=np.int32)
+    commands = np.array([*children, (0.0, 0.0)])
+    node, answered = tuple(map(float, node)), 0
+    for _ in range(10_000):
+        found = kernel(
+            node,
+            *sample,
+            len(children) - 1,
+            following,
+            commands,
+            unpack_model(model),
+            clearance_map.view,
+            clearance_map.answers,
+            answered,
+            np.empty(SCRATCH_SHAPE),
+        )
+        if found.outcome != ASK:
+            return found
+        answered = clearance_map.answer(answered, *found.control)
+    raise AssertionError("there is no end to the questions")
+
+
+def states_of(node: Sequence[float], found: Extension, model: NDArray[np.float64]) -> NDArray[np.float64]:
+    """States of an extension from its node on, shape (steps + 1, 5)."""
+    return replay_path(np.array(node, dtype=float), np.array([found.control]), np.array([found.steps]), model)[0]
+
+
+def between(a: NDArray[np.float64], b: NDArray[np.float64], share: float, model: NDArray[np.float64]) -> list[float]:
+    """Pose at a share of the step between two states."""
+    v, omega = b[3:] if int(model[0]) == STEERING else a[3:]
+    v_there, omega_there = v + share * (b[3] - v), omega + share * (b[4] - omega)
+    return list(unicycle_step(*a[:3], v, omega, v_there, omega_there, share * model[1]))
+
+
+def crowded_world() -> World:
+    """Obstacles of all kinds on 4 m x 4 m."""
+    return World(
+        Bounds((-2.0, -2.0), (2.0, 2.0)),
+        [
+            Box((-1.0, -1.2), (-0.8, 0.8)),
+            Disc((0.3, 0.9), 0.35),
+            OrientedBox((0.8, -0.8), (0.9, 0.05), 0.6),
+            Polygon(np.array([(1.2, 0.2), (1.8, 0.3), (1.5, 0.5), (1.7, 1.2)])),
+            Polygon(np.array([(-0.4, -1.7), (0.3, -1.5), (-0.2, -0.9)])),
+        ],
+    )
+
+
+def free_nodes(world: World, footprint: Footprint, count: int, seed: int) -> list[State]:
+    """Random states at which nothing is touched, at random velocities."""
+    rng = np.random.default_rng(seed)
+    low, high = (-2.0, -2.0, -math.pi, 0.0, LIMITS.omega_min), (2.0, 2.0, math.pi, 1.0, LIMITS.omega_max)
+    drawn = (State(*rng.uniform(low, high).tolist()) for _ in range(100 * count))
+    return [node for node in drawn if not world.collides(footprint, node[:3])][:count]
