@@ -230,8 +230,7 @@ class ClearanceMap:
         children: see :class:`MapView`; replaced when the map grows.
         clearances: see :class:`MapView`; replaced when the map grows.
         frame: the other numbers of the view, shape (FRAME_SIZE,).
-        answers: FCL's answers of the present extension, rows of (x, y, theta, margin) and a number
-            of :func:`cbrrt_ompl.motion_check.find_answer`'s, shape (n, 5).
+        findings: what was found about the present motion, see :func:`cbrrt_ompl.motion_check.recall`, shape (n, 2).
         exact_queries: states that FCL had to decide with the real footprint.
     """
 
@@ -257,7 +256,7 @@ class ClearanceMap:
         discs = disc_tree(footprint, MITRE_LIMIT * CONTACT_TOLERANCE)
         root = 2 * len(discs) if enabled else 0
         self.frame = np.array([*bounds.min, *bounds.max, size, inner, outer, footprint.is_round, root], dtype=float)
-        self.answers: NDArray[np.float64] = np.zeros((64, 5))
+        self.findings: NDArray[np.float64] = np.zeros((256, 2))
         self._margins: dict[tuple[float, float, float], float] = {}
         self._root, self._rows = root, root + 1 if enabled else 0
         self.children: NDArray[np.int32] = np.zeros(self._rows, dtype=np.int32)
@@ -311,25 +310,29 @@ class ClearanceMap:
             return self.checker.collides(x, y, theta)
         return bool(certificate == COLLISION)
 
-    def answer(self, answered: int, x: float, y: float, theta: float) -> int:
-        """Settle whether a pose has `ROOM`: by refining the map, else by a row of ``answers`` from FCL.
+    def forget_findings(self) -> None:
+        """Begin with a new motion."""
+        self.findings[0] = 0.0
+
+    def answer(self, x: float, y: float, theta: float) -> None:
+        """Settle whether a pose has `ROOM`: by refining the map, else by a row of ``findings`` from FCL.
 
         Args:
-            answered: rows of ``answers`` in use.
             x: position [m].
             y: position [m].
             theta: heading [rad].
-
-        Returns:
-            Rows of ``answers`` in use afterwards.
         """
-        if self._refine(x, y, theta, ROOM) != UNDECIDED:
-            return answered
-        if answered == len(self.answers):
-            self.answers = np.concatenate([self.answers, np.zeros_like(self.answers)])
-        self.exact_queries += 1
-        self.answers[answered, :4] = x, y, theta, self._margin(x, y, theta)
-        return answered + 1
+        used, rows = int(self.findings[0, 0]), len(self.findings)
+        self.findings[0, 1] = 0.0
+        if used == rows:  # some were lost: all of them are found again, with more room
+            self.findings = np.zeros((2 * rows, 2))
+        elif self._refine(x, y, theta, ROOM) == UNDECIDED:
+            self.exact_queries += 1
+            margin = self._margin(x, y, theta) - ROOM
+            if used + 1 == rows:
+                self.findings = np.concatenate([self.findings, np.zeros_like(self.findings)])
+            self.findings[used + 1] = margin if margin > 0.0 else COLLISION, False
+            self.findings[0, 0] = used + 1
 
     def _margin(self, x: float, y: float, theta: float) -> float:
         """FCL's margin at a pose, 0 in collision; for a round footprint the map keeps it, in place of an older one."""

@@ -52,8 +52,7 @@ def extend(
     commands: NDArray[np.float64],
     model: Model,
     view: MapView,
-    answers: NDArray[np.float64],
-    answered: int,
+    findings: NDArray[np.float64],
     scratch: NDArray[np.float64],
 ) -> Extension:
     """EXTEND_TRAJECTORY of the paper: from a node towards a sample, or by a final approach to the goal.
@@ -70,12 +69,11 @@ def extend(
         commands: command of each child, shape (n, 2).
         model: all settings.
         view: the clearance map.
-        answers: what FCL has said in this extension, see :func:`cbrrt_ompl.motion_check.find_answer`.
-        answered: rows of ``answers`` in use.
+        findings: what was found before in this extension, see :func:`cbrrt_ompl.motion_check.recall`.
         scratch: room for a block, of shape :data:`cbrrt_ompl.roll_out.SCRATCH_SHAPE`.
     """
     if first == UNTRIED and model.approaches:
-        best = approach(node, model, view, answers, answered, scratch)
+        best = approach(node, model, view, findings, scratch)
         if best.outcome != BLOCKED:
             return best
     reference = reference_pose(node[0], node[1], node[2], x_sample, y_sample, model.look_ahead)
@@ -85,7 +83,7 @@ def extend(
         v, omega, control = candidate(c, node, reference, model)
         if is_refused(first, following, commands, v, omega, model.equal_control_tolerance):
             continue
-        steps, outcome, state, pose = drive_safely(node, control, model, view, answers, answered, scratch)
+        steps, outcome, state, pose = drive_safely(node, control, model, view, findings, scratch)
         if outcome == ASK:
             return Extension(ASK, 0, node, (v, omega), pose)
         if steps == 0 or (outcome == BLOCKED and not model.keep_cut):
@@ -159,8 +157,7 @@ def approach(
     node: tuple[float, float, float, float, float],
     model: Model,
     view: MapView,
-    answers: NDArray[np.float64],
-    answered: int,
+    findings: NDArray[np.float64],
     scratch: NDArray[np.float64],
 ) -> Extension:
     """The final approach from a node to the goal, ahead or backwards, whichever is free and takes the smaller turn.
@@ -169,8 +166,7 @@ def approach(
         node: (x, y, theta, v, omega) of the node.
         model: all settings.
         view: the clearance map.
-        answers: what FCL has said, see :func:`cbrrt_ompl.motion_check.find_answer`.
-        answered: rows of ``answers`` in use.
+        findings: what was found before, see :func:`cbrrt_ompl.motion_check.recall`.
         scratch: room for a block, of shape :data:`cbrrt_ompl.roll_out.SCRATCH_SHAPE`.
 
     Returns:
@@ -183,7 +179,7 @@ def approach(
         if manoeuvre == REVERSE and model.limits.v_min == 0.0:
             continue
         control = (0.0, 0.0, manoeuvre)
-        steps, outcome, state, pose = drive_safely(node, control, model, view, answers, answered, scratch)
+        steps, outcome, state, pose = drive_safely(node, control, model, view, findings, scratch)
         if outcome == ASK:
             return Extension(ASK, 0, node, (0.0, 0.0), pose)
         if outcome == FREE and in_goal(goal, state[0], state[1], state[2], state[3], state[4]):

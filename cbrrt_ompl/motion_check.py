@@ -1,7 +1,8 @@
 """Compiled check of a motion between its states, the same for what planners drive and for motions given as rows.
 
 A kernel decides poses by the clearance map. Where the map cannot, it does not guess: it returns `ASK` with the pose in
-question, the caller lets FCL answer it and calls again with the answer, and all is repeated.
+question, the caller lets FCL answer it and calls again, and all is repeated, but for what was found before: the map's
+``findings``, which the kernel reads again in their order.
 """
 
 from __future__ import annotations
@@ -31,14 +32,15 @@ def is_free(states: NDArray[np.float64], dt: float, clearance_map: ClearanceMap)
     Returns:
         False as soon as one of them is not.
     """
-    m, answered = clearance_map, 0
+    m = clearance_map
     if m.collides(*states[0, :3].tolist()):
         return False
+    m.forget_findings()
     while True:
-        outcome, x, y, theta = check_rows(states, m.children, m.clearances, m.frame, m.answers, answered, dt)
+        outcome, x, y, theta = check_rows(states, m.children, m.clearances, m.frame, m.findings, dt)
         if outcome != ASK:
             return bool(outcome == FREE)
-        answered = m.answer(answered, x, y, theta)
+        m.answer(x, y, theta)
 
 
 @njit(cache=True)
@@ -47,8 +49,7 @@ def check_rows(
     children: NDArray[np.int32],
     clearances: NDArray[np.float64],
     frame: NDArray[np.float64],
-    answers: NDArray[np.float64],
-    answered: int,
+    findings: NDArray[np.float64],
     dt: float,
 ) -> tuple[int, float, float, float]:
     """Check all rows but the first, and the steps between them.
@@ -58,8 +59,7 @@ def check_rows(
         children: see :class:`cbrrt_ompl.clearance_map.MapView`.
         clearances: see :class:`cbrrt_ompl.clearance_map.MapView`.
         frame: see :class:`cbrrt_ompl.clearance_map.MapView`.
-        answers: what FCL has said, see :func:`find_answer`.
-        answered: rows of ``answers`` in use.
+        findings: what was found before, see :func:`recall`.
         dt: time between two rows [s].
 
     Returns:
@@ -77,7 +77,7 @@ def check_rows(
             margin -= used
         else:
             outcome, margin, is_certified, pose = check_step_motion(
-                start, end, travel, sweep, margin, is_certified, view, answers, answered, dt
+                start, end, travel, sweep, margin, is_certified, view, findings, dt
             )
             if outcome != FREE:
                 return outcome, pose[0], pose[1], pose[2]
@@ -112,8 +112,7 @@ def check_step_motion(
     margin: float,
     is_certified: bool,
     view: MapView,
-    answers: NDArray[np.float64],
-    answered: int,
+    findings: NDArray[np.float64],
     dt: float,
 ) -> tuple[int, float, bool, tuple[float, float, float]]:
     """Check the points of one step, each no more than `MOTION_RESOLUTION` after the one before.
@@ -130,8 +129,7 @@ def check_step_motion(
         margin: distance proven free at the start, beyond `ROOM` [m].
         is_certified: whether the margin holds for every heading; else it does for the heading there.
         view: the clearance map.
-        answers: what FCL has said, see :func:`find_answer`.
-        answered: rows of ``answers`` in use.
+        findings: what was found before, see :func:`recall`.
         dt: duration of the step [s].
 
     Returns:
@@ -156,37 +154,39 @@ def check_step_motion(
             v = start[3] + share * (end[3] - start[3])
             omega = start[4] + share * (end[4] - start[4])
             pose = unicycle_step(start[0], start[1], start[2], start[3], start[4], v, omega, share * dt)
-        margin, is_certified = certify_pose(view, pose[0], pose[1], pose[2], ROOM)
-        if margin == UNDECIDED:
-            margin, is_certified = find_answer(answers, answered, pose[0], pose[1], pose[2]), False
-            if margin < 0.0:
+        is_known, margin, is_certified = recall(findings)
+        if not is_known:
+            margin, is_certified = certify_pose(view, pose[0], pose[1], pose[2], ROOM)
+            if margin == UNDECIDED:
                 return ASK, margin, is_certified, pose
-            margin -= ROOM
+            note(findings, margin, is_certified)
         if margin <= 0.0:
             return BLOCKED, margin, is_certified, pose
     return FREE, margin, is_certified, pose
 
 
 @njit(cache=True)
-def find_answer(answers: NDArray[np.float64], answered: int, x: float, y: float, theta: float) -> float:
-    """What FCL said about a pose: its margin [m], 0 in collision, -1 where it was not asked.
-
-    A motion that is repeated asks in the same order, so the search begins behind the row found last, which the last
-    number of the first row names.
+def recall(findings: NDArray[np.float64]) -> tuple[bool, float, bool]:
+    """The next of the findings, for a motion that is repeated.
 
     Args:
-        answers: rows of (x, y, theta, margin, row), shape (n, 5).
-        answered: rows in use.
-        x: position [m].
-        y: position [m].
-        theta: heading [rad].
+        findings: rows of (margin [m], whether it holds for every heading), in the order in which they were looked for,
+            behind a row that counts those in use and those read, shape (n, 2).
+
+    Returns:
+        Whether there is one, and its two numbers.
     """
-    i = int(answers[0, 4])
-    for _ in range(answered):
-        if i >= answered:
-            i = 0
-        if answers[i, 0] == x and answers[i, 1] == y and answers[i, 2] == theta:
-            answers[0, 4] = i + 1
-            return answers[i, 3]
-        i += 1
-    return -1.0
+    row = int(findings[0, 1]) + 1
+    if row > int(findings[0, 0]):
+        return False, 0.0, False
+    findings[0, 1] = row
+    return True, findings[row, 0], findings[row, 1] != 0.0
+
+
+@njit(cache=True)
+def note(findings: NDArray[np.float64], margin: float, is_certified: bool) -> None:
+    """Append a finding; where there is no room left, count as many as there are rows: some are lost."""
+    row = min(int(findings[0, 0]) + 1, len(findings))
+    findings[0, 0] = findings[0, 1] = row
+    if row < len(findings):
+        findings[row, 0], findings[row, 1] = margin, is_certified

@@ -21,7 +21,7 @@ from cbrrt_ompl.kinematics import (
     wrap_angle,
 )
 from cbrrt_ompl.manoeuvres import BRAKE, is_manoeuvre, most_steps
-from cbrrt_ompl.motion_check import ASK, BLOCKED, FREE, check_step_motion, ways_of_step
+from cbrrt_ompl.motion_check import ASK, BLOCKED, FREE, check_step_motion, note, recall, ways_of_step
 from cbrrt_ompl.motion_model import (
     CLOSED_LOOP,
     STEERING,
@@ -96,8 +96,7 @@ def roll_out(
     control: tuple[float, float, float],
     model: Model,
     view: MapView,
-    answers: NDArray[np.float64],
-    answered: int,
+    findings: NDArray[np.float64],
     scratch: NDArray[np.float64],
 ) -> tuple[int, int, tuple[float, float, float, float, float], tuple[float, float, float]]:
     """Drive from a valid state under one control until the horizon, the goal or an obstacle.
@@ -109,8 +108,7 @@ def roll_out(
         control: see :func:`cbrrt_ompl.motion_model.advance`, whose steps these are, bit for bit.
         model: how the robot moves.
         view: the clearance map.
-        answers: what FCL has said, see :func:`cbrrt_ompl.motion_check.find_answer`.
-        answered: rows of ``answers`` in use.
+        findings: what was found before, see :func:`cbrrt_ompl.motion_check.recall`.
         scratch: room for a block, of shape `SCRATCH_SHAPE`.
 
     Returns:
@@ -124,9 +122,7 @@ def roll_out(
         steps = most_steps(control[2], math.hypot(goal.x - x, goal.y - y), model.limits, dt)
     reach = 0.0 if view.is_round else view.outer
     near_goal = goal.tolerance * goal.tolerance * (1.0 + 1e-9)
-    margin, is_certified = certify_pose(view, x, y, theta, ROOM)
-    margin = max(margin, 0.0)
-    k = 0
+    margin, is_certified, k = 0.0, False, 0
     while k < steps:
         if manoeuvres or model.law == CLOSED_LOOP:
             if manoeuvres:
@@ -147,12 +143,13 @@ def roll_out(
                 margin -= used
             else:
                 outcome, margin, is_certified, pose = check_step_motion(
-                    start, end, travel, sweep, margin, is_certified, view, answers, answered, dt
+                    start, end, travel, sweep, margin, is_certified, view, findings, dt
                 )
                 if outcome != FREE:
                     if outcome == ASK and not model.keep_cut:
                         if is_doomed(x, y, theta, v, omega, steps - k, control, model, view):
                             outcome = BLOCKED
+                            note(findings, COLLISION, False)
                     return k, outcome, (x, y, theta, v, omega), pose
             x, y, theta, v, omega = end
             k += 1
@@ -194,28 +191,27 @@ def drive_safely(
     control: tuple[float, float, float],
     model: Model,
     view: MapView,
-    answers: NDArray[np.float64],
-    answered: int,
+    findings: NDArray[np.float64],
     scratch: NDArray[np.float64],
 ) -> tuple[int, int, tuple[float, float, float, float, float], tuple[float, float, float]]:
     """:func:`roll_out`, cut before the first step whose end leaves no room to brake where the model is brake-safe.
 
     Robots whose velocities jump stop on the spot, so that nothing is cut.
     """
-    steps, outcome, end, pose = roll_out(node, control, model, view, answers, answered, scratch)
+    steps, outcome, end, pose = roll_out(node, control, model, view, findings, scratch)
     if not model.brake_safe or model.law == STEERING or outcome == ASK or (outcome == BLOCKED and not model.keep_cut):
         return steps, outcome, end, pose
     unchecked = steps
     if not model.keep_cut:  # the end first: it is the likeliest to be refused
         unchecked -= 1
-        stops, asked = check_braking(end, model, view, answers, answered, scratch)
+        stops, asked = check_braking(end, model, view, findings, scratch)
         if stops != FREE:
             return 0, stops, node, asked
     x, y, theta, v, omega = node
     for k in range(unchecked):
         before = (x, y, theta, v, omega)
         x, y, theta, v, omega, _, _ = advance(x, y, theta, v, omega, control, model, model.dt)
-        stops, asked = check_braking((x, y, theta, v, omega), model, view, answers, answered, scratch)
+        stops, asked = check_braking((x, y, theta, v, omega), model, view, findings, scratch)
         if stops != FREE:
             return k, stops, before, asked
     return steps, outcome, end, pose
@@ -226,13 +222,16 @@ def check_braking(
     state: tuple[float, float, float, float, float],
     model: Model,
     view: MapView,
-    answers: NDArray[np.float64],
-    answered: int,
+    findings: NDArray[np.float64],
     scratch: NDArray[np.float64],
 ) -> tuple[int, tuple[float, float, float]]:
     """Brake to rest from a valid state: `FREE`, `BLOCKED` or `ASK`, and the pose that FCL must decide."""
     stopping_distance = abs(state[3]) * (0.5 * stopping_time(state[3], state[4], model.limits) + model.dt)
-    if certify(view, state[0], state[1], ROOM) > stopping_distance:
+    is_known, margin, _ = recall(findings)
+    if not is_known:
+        margin = certify(view, state[0], state[1], ROOM)
+        note(findings, margin, True)
+    if margin > stopping_distance:
         return FREE, (0.0, 0.0, 0.0)
-    _, outcome, _, pose = roll_out(state, (0.0, 0.0, BRAKE), model, view, answers, answered, scratch)
+    _, outcome, _, pose = roll_out(state, (0.0, 0.0, BRAKE), model, view, findings, scratch)
     return outcome, pose

@@ -61,7 +61,8 @@ def drive(
     """One extension, all its questions answered; ``children`` are the commands that the node has used."""
     following = np.arange(-1, len(children), dtype=np.int32)
     commands = np.array([*children, (0.0, 0.0)])
-    node, answered = tuple(map(float, node)), 0
+    node = tuple(map(float, node))
+    clearance_map.forget_findings()
     for _ in range(10_000):
         found = kernel(
             node,
@@ -71,14 +72,18 @@ def drive(
             commands,
             unpack_model(model),
             clearance_map.view,
-            clearance_map.answers,
-            answered,
+            clearance_map.findings,
             np.empty(SCRATCH_SHAPE),
         )
         if found.outcome != ASK:
             return found
-        answered = clearance_map.answer(answered, *found.control)
+        clearance_map.answer(*found.control)
     raise AssertionError("there is no end to the questions")
+
+
+def findings(clearance_map: ClearanceMap) -> list[list[float]]:
+    """What was found about the present motion: rows of (margin, whether for every heading)."""
+    return clearance_map.findings[1 : 1 + int(clearance_map.findings[0, 0])].tolist()
 
 
 def states_of(node: Sequence[float], found: Extension, model: NDArray[np.float64]) -> NDArray[np.float64]:

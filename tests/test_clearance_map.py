@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from kernels import findings
 
 from cbrrt_ompl import clearance_map as module
-from cbrrt_ompl.clearance_map import COLLISION, UNDECIDED, ClearanceMap, certify, certify_pose, clearance_map_for
+from cbrrt_ompl.clearance_map import COLLISION, ROOM, UNDECIDED, ClearanceMap, certify, certify_pose, clearance_map_for
 from cbrrt_ompl.obstacles import Bounds, Box, Disc, Obstacle, OrientedBox, Polygon
 from cbrrt_ompl.robot import Footprint
 from cbrrt_ompl.world import World
@@ -370,9 +371,10 @@ def test_states_that_fcl_decided_are_counted(rng: np.random.Generator) -> None:
     assert on.exact_queries == 0
 
 
-def test_a_decided_question_takes_no_row_of_answers() -> None:
+def test_a_decided_question_takes_no_row_of_findings() -> None:
     clearance_map = ClearanceMap(small_world(), FOOTPRINTS["rectangle"])
-    assert clearance_map.answer(0, -0.5, -1.0, 0.0) == 0
+    clearance_map.answer(-0.5, -1.0, 0.0)
+    assert findings(clearance_map) == []
     assert certify(clearance_map.view, -0.5, -1.0, 0.0) > 0.0
     assert clearance_map.exact_queries == 0
 
@@ -380,10 +382,11 @@ def test_a_decided_question_takes_no_row_of_answers() -> None:
 def test_answers_are_fcl_s_margins_however_many_there_are(rng: np.random.Generator) -> None:
     clearance_map = ClearanceMap(small_world(), FOOTPRINTS["rectangle"], enabled=False)
     poses = rng.uniform((-2.0, -2.0, -3.0), (2.0, 2.0, 3.0), (300, 3))
-    for i, pose in enumerate(poses.tolist()):
-        assert clearance_map.answer(i, *pose) == i + 1
-    assert np.array_equal(clearance_map.answers[:300, :3], poses)
-    assert clearance_map.answers[:300, 3].tolist() == [clearance_map.checker.margin(*pose) for pose in poses.tolist()]
+    for pose in poses.tolist():
+        clearance_map.answer(*pose)
+    margins = [clearance_map.checker.margin(*pose) - ROOM for pose in poses.tolist()]
+    assert min(margins) < 0.0 < max(margins)
+    assert findings(clearance_map) == [[margin if margin > 0.0 else COLLISION, 0.0] for margin in margins]
 
 
 def test_a_world_keeps_one_map_a_footprint() -> None:

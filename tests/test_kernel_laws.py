@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from kernels import findings
 from strategies import SHARES, WHEELED
 
 from cbrrt_ompl import clearance_map
@@ -189,7 +190,8 @@ class TestClearanceMap:
     def test_no_cell_is_split_for_a_disc_that_a_surface_cuts(self) -> None:
         """Such a disc cannot be decided in cells of any size; the parts of the robot can, in large ones."""
         beside = ClearanceMap(World(Bounds((-2.0, -2.0), (2.0, 2.0)), [Box((-2.0, 0.4), (2.0, 2.0))]), LONG)
-        assert beside.answer(0, 0.1, 0.0, 0.0) == 0
+        beside.answer(0.1, 0.0, 0.0)
+        assert findings(beside) == []
         assert certify(beside.view, 0.1, 0.0, ROOM) == UNDECIDED
         assert 1 < beside.cells < 1 + 4 * math.log2(4.0 / SMALLEST_CELL)
 
@@ -201,7 +203,8 @@ class TestClearanceMap:
         world = World(Bounds((-3.0, -1.0), (3.0, 1.0)), [Box((-3.0, y), (3.0, y + 0.7)) for y in (-0.95, 0.25)])
         corridor = ClearanceMap(world, LONG)
         for x, y, theta in np.random.default_rng(5).uniform((-2.4, -0.02, -0.02), (2.4, 0.02, 0.02), (200, 3)).tolist():
-            assert corridor.answer(0, x, y, theta) == 0
+            corridor.answer(x, y, theta)
+            assert findings(corridor) == []
             assert certify(corridor.view, x, y, ROOM) == UNDECIDED
             margin, is_of_the_origin = certify_pose(corridor.view, x, y, theta, ROOM)
             assert margin > 0.0 and not is_of_the_origin
@@ -210,7 +213,8 @@ class TestClearanceMap:
     def test_a_finest_part_is_certified_with_a_small_margin_too(self) -> None:
         walls = [Box((-3.0, y), (3.0, y + 0.5)) for y in (-0.705, 0.205)]  # 1.5 cm beside the finest discs
         corridor = ClearanceMap(World(Bounds((-3.0, -1.0), (3.0, 1.0)), walls), LONG)
-        assert corridor.answer(0, 0.0, 0.0, 0.0) == 0
+        corridor.answer(0.0, 0.0, 0.0)
+        assert findings(corridor) == []
         assert 0.0 < certify_pose(corridor.view, 0.0, 0.0, 0.0, ROOM)[0] < GOOD_MARGIN
         assert corridor.exact_queries == 0
 
@@ -218,14 +222,16 @@ class TestClearanceMap:
         """The footprint is further from them than its origin, which may not leave them either."""
         footprint = Footprint.polygon([(0.1, -0.1), (0.3, -0.1), (0.3, 0.1), (0.1, 0.1)])
         beside = ClearanceMap(World(Bounds((-1.0, -1.0), (1.0, 1.0))), footprint)
-        assert beside.answer(0, -0.95, 0.0, 0.0) == 0
+        beside.answer(-0.95, 0.0, 0.0)
+        assert findings(beside) == []
         margin, is_of_the_origin = certify_pose(beside.view, -0.95, 0.0, 0.0, ROOM)
         assert 0.0 < margin <= 0.05 + 1e-12 and not is_of_the_origin
 
     def test_a_part_inside_an_obstacle_is_certified_as_a_collision(self) -> None:
         world = World(Bounds((-3.0, -1.0), (3.0, 1.0)), [Box((0.2, -0.5), (1.0, 0.5))])
         beside = ClearanceMap(world, LONG)
-        assert beside.answer(0, 0.0, 0.0, 0.0) == 0
+        beside.answer(0.0, 0.0, 0.0)
+        assert findings(beside) == []
         assert certify(beside.view, 0.0, 0.0, ROOM) == UNDECIDED
         assert certify_pose(beside.view, 0.0, 0.0, 0.0, ROOM) == (COLLISION, False)
         assert beside.exact_queries == 0
@@ -235,19 +241,20 @@ class TestClearanceMap:
         world = World(Bounds((-1.0, -1.0), (1.0, 1.0)), [Box((0.3, -1.0), (1.0, 1.0))])
         kept = ClearanceMap(world, Footprint.disc(0.2))
         x = 0.1 - 0.9 * ROOM
-        assert kept.answer(0, x, 0.0, 0.0) == 1
-        assert kept.answers[0, :3].tolist() == [x, 0.0, 0.0]
-        assert kept.answers[0, 3] == pytest.approx(0.9 * ROOM, abs=1e-5)
-        assert certify(kept.view, x, 0.0, 0.0) == kept.answers[0, 3]
+        kept.answer(x, 0.0, 0.0)
+        assert findings(kept) == [[COLLISION, 0.0]]
+        assert certify(kept.view, x, 0.0, 0.0) == pytest.approx(0.9 * ROOM, abs=1e-5)
         cells = kept.cells
-        assert kept.answer(0, x, 0.0, 1.0) == 0
+        kept.forget_findings()
+        kept.answer(x, 0.0, 1.0)
+        assert findings(kept) == []
         assert kept.cells == cells
 
     @pytest.mark.parametrize("share", [0.5, 1.5])
     def test_a_position_is_certified_by_whether_it_has_room(self, share: float) -> None:
         world = World(Bounds((-1.0, -1.0), (1.0, 1.0)), [Box((0.3, -1.0), (1.0, 1.0))])
         near, x = ClearanceMap(world, Footprint.point()), 0.3 - share * ROOM
-        near.answer(0, x, 0.1, 0.0)
+        near.answer(x, 0.1, 0.0)
         certificate = certify(near.view, x, 0.1, ROOM)
         assert certificate == COLLISION if share < 1.0 else 0.0 < certificate <= 0.5 * ROOM
 
@@ -256,8 +263,9 @@ class TestClearanceMap:
         world = World(Bounds((-1.0, -1.0), (1.0, 1.0)))
         bounded = ClearanceMap(world, LONG, enabled=False)
         for i in range(8):
-            assert bounded.answer(0, 0.01 * i, 0.0, 0.0) == 1
-            assert bounded.answers[0, 3] == bounded.checker.margin(0.01 * i, 0.0, 0.0)
+            bounded.forget_findings()
+            bounded.answer(0.01 * i, 0.0, 0.0)
+            assert findings(bounded) == [[bounded.checker.margin(0.01 * i, 0.0, 0.0) - ROOM, 0.0]]
         assert 1 <= len(bounded._margins) <= 3
 
 

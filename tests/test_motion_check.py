@@ -100,10 +100,13 @@ class TestThinWalls:
 class TestWhatTheMapHolds:
     """What is accepted depends on the points of the way alone: not on the map, and not on whether there is one."""
 
+    @pytest.mark.parametrize("brake_safe", [False, True], ids=["", "brake safe"])
     @pytest.mark.parametrize("cut", ["discard", "keep"])
-    def test_an_extension_ends_at_the_same_bits(self, footprint: Footprint, law: int, cut: str) -> None:
+    def test_an_extension_ends_at_the_same_bits(
+        self, footprint: Footprint, law: int, cut: str, brake_safe: bool
+    ) -> None:
         world, rng = crowded_world(), np.random.default_rng(8)
-        model = model_of(law, Goal(0.5, 0.2, 0.2), cut_extension=cut)
+        model = model_of(law, Goal(0.5, 0.2, 0.2), cut_extension=cut, brake_safe=brake_safe)
         off, grown = ClearanceMap(world, footprint, enabled=False), ClearanceMap(world, footprint)
         for pose in rng.uniform((-2.0, -2.0, -math.pi), (2.0, 2.0, math.pi), (1500, 3)).tolist():
             grown.collides(*pose)
@@ -111,7 +114,9 @@ class TestWhatTheMapHolds:
         for node in free_nodes(world, footprint, 60, seed=9):
             sample = tuple(rng.uniform(-2.0, 2.0, 2).tolist())
             exact = drive(off, node, sample, model)
-            for clearance_map in (grown, ClearanceMap(world, footprint)):
+            forgetful = ClearanceMap(world, footprint, enabled=False)
+            forgetful.findings = np.zeros((2, 2))  # to be enlarged in mid-extension
+            for clearance_map in (grown, ClearanceMap(world, footprint), forgetful):
                 found = drive(clearance_map, node, sample, model)
                 assert found[:3] == exact[:3]
                 assert exact.outcome == BLOCKED or found == exact

@@ -41,14 +41,12 @@ def driven_straight(law: int, footprint: Footprint, wall: OrientedBox | None, he
     control = (SPEED, 0.0, 0.0)
     if law == CLOSED_LOOP:
         control = (5.0 * math.cos(heading), 5.0 * math.sin(heading), heading)
-    answered, scratch = 0, np.empty(SCRATCH_SHAPE)
+    scratch = np.empty(SCRATCH_SHAPE)
     for _ in range(10_000):
-        _, outcome, state, pose = roll_out(
-            node, control, model, clearance_map.view, clearance_map.answers, answered, scratch
-        )
+        _, outcome, state, pose = roll_out(node, control, model, clearance_map.view, clearance_map.findings, scratch)
         if outcome != ASK:
             return outcome, math.hypot(*state[:2])
-        answered = clearance_map.answer(answered, *pose)
+        clearance_map.answer(*pose)
     raise AssertionError("there is no end to the questions")
 
 

@@ -154,8 +154,7 @@ def grow(
     clearances: NDArray[np.float64],
     frame: NDArray[np.float64],
     draws: NDArray[np.float64],
-    answers: NDArray[np.float64],
-    answered: int,
+    findings: NDArray[np.float64],
     counters: NDArray[np.int64],
     last_sample: int,
     question: NDArray[np.float64],
@@ -187,8 +186,7 @@ def grow(
         clearances: see above.
         frame: see above.
         draws: random numbers in [0, 1), a sample a row, shape (m, DRAWS), or (m, ROBUST_DRAWS).
-        answers: what FCL has said about the present extension.
-        answered: rows of ``answers`` in use.
+        findings: what was found before in the present extension, see :func:`cbrrt_ompl.motion_check.recall`.
         counters: see `NODES`; carried from call to call, shape (COUNTERS,).
         last_sample: number of samples to pause at.
         question: takes the pose that FCL must decide, shape (3,).
@@ -225,13 +223,11 @@ def grow(
             states[parent, 3],
             states[parent, 4],
         )
-        extension = extend(
-            origin, x, y, first_child[parent], siblings, commands, model, view, answers, answered, scratch
-        )
+        extension = extend(origin, x, y, first_child[parent], siblings, commands, model, view, findings, scratch)
         if extension.outcome == ASK:
             question[0], question[1], question[2] = extension.control
             return WANT_ANSWER
-        answered = 0
+        findings[0] = 0.0
         if first_child[parent] == UNTRIED:
             first_child[parent] = NO_CHILD
         counters[DRAWN] += 1

@@ -124,7 +124,8 @@ class Search:
         An extension that takes longer goes on, unless the search is to stop; it is then begun anew if that goes on.
         """
         t, m = self._tree, self._map
-        answered, asked_at, first_sample = 0, -1, self.samples
+        asked_at, first_sample = -1, self.samples
+        m.forget_findings()
         while True:
             status = grow(
                 *t,
@@ -140,8 +141,7 @@ class Search:
                 m.clearances,
                 m.frame,
                 self._draws,
-                m.answers,
-                answered,
+                m.findings,
                 self.counters,
                 last_sample,
                 self._question,
@@ -153,9 +153,8 @@ class Search:
                     if (is_new and self.samples > first_sample) or should_stop(self.samples):
                         return
                     deadline = time.perf_counter() + PAUSE
-                if is_new:
-                    answered, asked_at = 0, self.samples
-                answered = m.answer(answered, *self._question.tolist())
+                asked_at = self.samples
+                m.answer(*self._question.tolist())
             elif status == WANT_DRAWS:
                 rows, columns = self._draws.shape
                 self._draws = self._rng.random((min(max(2 * rows, 256), DRAWS_AT_ONCE), columns))

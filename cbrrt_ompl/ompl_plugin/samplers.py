@@ -65,6 +65,7 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         self._sample.read(dest)
         node = self._node.values.tobytes()
         first = self._first_child.setdefault(node, UNTRIED)
+        self._map.forget_findings()
         status = self._extend(first)
         if status == ASK:
             status = self._ask_and_extend(first)
@@ -80,7 +81,7 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         self._sample.write(dest)
         return int(outcome[0])
 
-    def _extend(self, first: int, answered: int = 0) -> int:
+    def _extend(self, first: int) -> int:
         """Run the kernel on the present node and sample."""
         m = self._map
         return extend_packed(
@@ -93,19 +94,18 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
             m.children,
             m.clearances,
             m.frame,
-            m.answers,
-            answered,
+            m.findings,
             self._outcome,
             self._scratch,
         )
 
     def _ask_and_extend(self, first: int) -> int:
         """Answer the kernel's questions by FCL until it has none, or the search is to stop."""
-        status, answered = ASK, 0
+        status = ASK
         while status == ASK and not self.should_stop(self.samples):
             x, y, theta = self._outcome[3:6].tolist()
-            answered = self._map.answer(answered, x, y, theta)
-            status = self._extend(first, answered)
+            self._map.answer(x, y, theta)
+            status = self._extend(first)
         return status
 
     def _remember(self, node: bytes, v: float, omega: float) -> None:
@@ -143,8 +143,7 @@ def extend_packed(
     children: NDArray[np.int32],
     clearances: NDArray[np.float64],
     frame: NDArray[np.float64],
-    answers: NDArray[np.float64],
-    answered: int,
+    findings: NDArray[np.float64],
     outcome: NDArray[np.float64],
     scratch: NDArray[np.float64],
 ) -> int:
@@ -158,8 +157,7 @@ def extend_packed(
         commands,
         unpack_model(model),
         unpack_view(children, clearances, frame),
-        answers,
-        answered,
+        findings,
         scratch,
     )
     outcome[0] = extension.steps
@@ -182,8 +180,7 @@ def warm_up_sampler(model: NDArray[np.float64], clearance_map: ClearanceMap) -> 
         clearance_map.children,
         clearance_map.clearances,
         clearance_map.frame,
-        clearance_map.answers,
-        0,
+        clearance_map.findings,
         np.empty(OUTCOME_SIZE),
         np.empty(SCRATCH_SHAPE),
     )
