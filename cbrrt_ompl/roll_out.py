@@ -21,7 +21,7 @@ from cbrrt_ompl.kinematics import (
     wrap_angle,
 )
 from cbrrt_ompl.manoeuvres import BRAKE, is_manoeuvre, most_steps
-from cbrrt_ompl.motion_check import ASK, BLOCKED, FREE, check_step_motion, note, recall, ways_of_step
+from cbrrt_ompl.motion_check import ASK, BLOCKED, FREE, check_step_motion, note, recall, sum_up, ways_of_step
 from cbrrt_ompl.motion_model import (
     CLOSED_LOOP,
     STEERING,
@@ -233,5 +233,8 @@ def check_braking(
         note(findings, margin, True)
     if margin > stopping_distance:
         return FREE, (0.0, 0.0, 0.0)
+    row = int(findings[0, 1])
     _, outcome, _, pose = roll_out(state, (0.0, 0.0, BRAKE), model, view, findings, scratch)
+    if outcome == FREE:
+        sum_up(findings, row)
     return outcome, pose
