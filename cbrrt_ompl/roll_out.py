@@ -122,7 +122,12 @@ def roll_out(
         steps = most_steps(control[2], math.hypot(goal.x - x, goal.y - y), model.limits, dt)
     reach = 0.0 if view.is_round else view.outer
     near_goal = goal.tolerance * goal.tolerance * (1.0 + 1e-9)
-    margin, is_certified, k = 0.0, False, 0
+    is_known, margin, is_certified = recall(findings)
+    if not is_known:
+        margin, is_certified = certify_pose(view, x, y, theta, ROOM)
+        margin = max(margin, 0.0)
+        note(findings, margin, is_certified)
+    k = 0
     while k < steps:
         if manoeuvres or model.law == CLOSED_LOOP:
             if manoeuvres:
