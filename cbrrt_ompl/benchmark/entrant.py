@@ -79,8 +79,11 @@ class Entrant(ob.Planner):  # type: ignore[misc]  # OMPL has no type information
     def solve(self, condition: Any) -> Any:
         """Run the planner until it ends, the condition holds, or ``max_samples`` are drawn."""
         self._rounds = 0
-        inner = ob.PlannerTerminationCondition(ob.PlannerTerminationConditionFn(self._stop_condition(condition)))
         began = time.perf_counter()
+        end = began + self.time_limit
+        inner = ob.PlannerTerminationCondition(ob.PlannerTerminationConditionFn(self._stop_condition(condition, end)))
+        if self.equipment is not None:
+            self.equipment.should_stop = lambda _: time.perf_counter() >= end
         status = self.planner.solve(inner)
         self.planning_time = time.perf_counter() - began
         return status
@@ -113,10 +116,9 @@ class Entrant(ob.Planner):  # type: ignore[misc]  # OMPL has no type information
             return CompiledPlanner(si, self._scenario, name, self._map, seed)
         return make_planner(si, self._scenario, name, self._map)
 
-    def _stop_condition(self, condition: Any) -> Callable[[], bool]:
-        """OMPL's condition, the limit of time and, where OMPL does the sampling, that of samples."""
+    def _stop_condition(self, condition: Any, end: float) -> Callable[[], bool]:
+        """OMPL's condition, the end of the time and, where OMPL does the sampling, the limit of samples."""
         limit = math.inf if self.getName() in COMPILED_PLANNERS else self._scenario.planning.max_samples
-        end = time.perf_counter() + self.time_limit
 
         def should_stop() -> bool:
             if self._rounds >= limit or time.perf_counter() >= end or condition():
