@@ -125,7 +125,8 @@ def roll_out(
     is_known, margin, is_certified = recall(findings)
     if not is_known:
         margin, is_certified = certify_pose(view, x, y, theta, ROOM)
-        margin = max(margin, 0.0)
+        if margin <= 0.0:  # valid all the same, yet with less room than a motion needs
+            margin, is_certified = 0.0, False
         note(findings, margin, is_certified)
     k = 0
     while k < steps:
