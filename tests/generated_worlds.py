@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import traceback
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from independent_checker import refusals
 from cbrrt_ompl.errors import ScenarioError
 from cbrrt_ompl.planning import plan
 from cbrrt_ompl.scenario import Scenario, scenario_from_dict, scenario_to_dict
+from cbrrt_ompl.settings import State
 from cbrrt_ompl.trajectory import COLUMNS
 from cbrrt_ompl.verification import verify
 
@@ -64,13 +66,26 @@ def outcomes(seed: int, world: int, max_samples: int, time_limit: float = 5.0) -
 
 
 def world_of(seed: int, world: int, max_samples: int) -> Scenario:
-    """A random scenario in which the start is free."""
+    """A random scenario in which the start is free; in each sixth world it nearly touches something."""
     rng = np.random.default_rng([seed, world])
     while True:
         try:
-            return scenario_from_dict(random_scenario(rng, max_samples))
+            scenario = scenario_from_dict(random_scenario(rng, max_samples))
+            return replace(scenario, start=_beside_obstacle(rng, scenario)) if world % 6 == 5 else scenario
         except ScenarioError:
             continue
+
+
+def _beside_obstacle(rng: Generator, scenario: Scenario) -> State:
+    """A scenario's start, moved in a random direction until less than a millimetre is left."""
+    start, checker = scenario.start, scenario.world.checker(scenario.robot.footprint)
+    angle, aim = rng.uniform(-math.pi, math.pi), 10.0 ** rng.uniform(-6.0, -3.0)
+    for _ in range(1000):
+        step = checker.clearance(start.x, start.y, start.theta) - 0.5 * aim
+        if step < 0.5 * aim:
+            break
+        start = start._replace(x=start.x + step * math.cos(angle), y=start.y + step * math.sin(angle))
+    return start
 
 
 def random_scenario(rng: Generator, max_samples: int) -> dict[str, Any]:
@@ -100,6 +115,7 @@ def random_scenario(rng: Generator, max_samples: int) -> dict[str, Any]:
             "cut_extension": str(rng.choice(["discard", "keep"])),
             "equal_control_tolerance": float(rng.choice([0.0, 0.1, 0.1])),
             "closed_loop": bool(rng.random() < 0.3),
+            "brake_safe": bool(rng.random() < 0.2),
         },
     }
 
@@ -157,6 +173,16 @@ def _limits(rng: Generator) -> dict[str, Any]:
         "omega": [-left, left if rng.random() < 0.7 else right],
         "acceleration": float(rng.uniform(0.2, 3.0)),
         "angular_acceleration": float(rng.uniform(0.3, 4.0)),
+        **(_wheels(rng) if rng.random() < 0.2 else {}),
+    }
+
+
+def _wheels(rng: Generator) -> dict[str, float]:
+    """Limits of the wheels, of which the other limits may well leave little."""
+    return {
+        "wheel_separation": float(rng.uniform(0.1, 0.6)),
+        "wheel_speed": float(rng.uniform(0.2, 2.0)),
+        "wheel_acceleration": float(rng.uniform(0.3, 3.0)),
     }
 
 

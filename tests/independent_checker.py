@@ -92,10 +92,29 @@ def _limits(limits: Mapping[str, Any], rows: Mapping[str, NDArray[np.float64]]) 
             if outside.any():
                 yield f"limits: {column} = {rows[column][outside][0]} in row {np.flatnonzero(outside)[0]}"
 
+    left, right = _wheels(limits, rows["v"], rows["omega"])
+    for name, speeds in (("left", left), ("right", right)):
+        too_fast = ~(np.abs(speeds) <= limits.get("wheel_speed", math.inf) * (1.0 + 1e-9))
+        if too_fast.any():
+            yield f"limits: {name} wheel in row {np.flatnonzero(too_fast)[0]}"
+
+
+def _wheels(limits: Mapping[str, Any], v: Any, omega: Any) -> tuple[Any, Any]:
+    """Speeds of the left and of the right wheel over the ground [m/s]."""
+    rim = limits.get("wheel_separation", 0.0) / 2.0 * omega
+    return v - rim, v + rim
+
 
 def _accelerations(limits: Mapping[str, Any], rows: Mapping[str, NDArray[np.float64]]) -> Iterator[str]:
-    for name, limit in (("v", limits["acceleration"]), ("omega", limits["angular_acceleration"])):
-        changes = np.abs(np.diff(rows[name]))
+    left, right = _wheels(limits, rows["v"], rows["omega"])
+    wheel_acceleration = limits.get("wheel_acceleration", math.inf)
+    for name, values, limit in (
+        ("v", rows["v"], limits["acceleration"]),
+        ("omega", rows["omega"], limits["angular_acceleration"]),
+        ("left wheel", left, wheel_acceleration),
+        ("right wheel", right, wheel_acceleration),
+    ):
+        changes = np.abs(np.diff(values))
         too_fast = ~(changes <= limit * np.diff(rows["t"]) * (1.0 + 1e-9) + 1e-12)
         if too_fast.any():
             yield f"acceleration: {name} in row {np.flatnonzero(too_fast)[0]}"
@@ -118,11 +137,7 @@ def driven(
         if kinematic:
             velocities[k] = target, target_rate, target, target_rate
             continue
-        step, turn = limits["acceleration"] * duration, limits["angular_acceleration"] * duration
-        v_next = target if abs(target - v) <= step else v + math.copysign(step, target - v)
-        omega_next = (
-            target_rate if abs(target_rate - omega) <= turn else omega + math.copysign(turn, target_rate - omega)
-        )
+        v_next, omega_next = _ramped(limits, v, omega, target - v, target_rate - omega, duration)
         velocities[k] = v, omega, v_next, omega_next
         v, omega = v_next, omega_next
     turns = durations * (velocities[:, 1] + velocities[:, 3]) / 2.0
@@ -130,6 +145,24 @@ def driven(
     ways = ways_within(headings[:-1], velocities, durations)
     start = np.array([rows["x"][0], rows["y"][0]])
     return np.column_stack([start + np.vstack([np.zeros(2), np.cumsum(ways, axis=0)]), headings]), velocities
+
+
+def _ramped(
+    limits: Mapping[str, Any], v: float, omega: float, dv: float, domega: float, duration: float
+) -> tuple[float, float]:
+    """Velocities after a time in which they are to change by some amounts, as far as the accelerations allow."""
+    shares = {"v": 1.0, "omega": 1.0}
+    for name, change, acceleration in (
+        ("v", dv, limits["acceleration"]),
+        ("omega", domega, limits["angular_acceleration"]),
+    ):
+        if abs(change) > acceleration * duration:
+            shares[name] = acceleration * duration / abs(change)
+    if {"wheel_speed", "wheel_acceleration"} & set(limits):  # they then change together, and no wheel too fast
+        most = limits.get("wheel_acceleration", math.inf) * duration
+        wheels = [most / abs(change) for change in _wheels(limits, dv, domega) if abs(change) > most]
+        shares["v"] = shares["omega"] = min(*shares.values(), *wheels)
+    return v + shares["v"] * dv, omega + shares["omega"] * domega
 
 
 def ways_within(

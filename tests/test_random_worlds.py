@@ -76,6 +76,29 @@ def test_the_checker_finds_what_was_tampered_with(column: str, row: int, by: flo
 
 
 @pytest.mark.parametrize(
+    ("wheels", "reason"),
+    [
+        ({"wheel_speed": 1.0, "wheel_acceleration": 0.5}, None),
+        ({"wheel_speed": 0.9}, "limits: left wheel in row 19"),
+        ({"wheel_acceleration": 0.4}, "acceleration: left wheel in row 0"),
+    ],
+)
+def test_the_checker_knows_limits_of_the_wheels(wheels: dict[str, float], reason: str | None) -> None:
+    robot = {**SCENE["robot"], "limits": {**SCENE["robot"]["limits"], "wheel_separation": 0.4, **wheels}}
+    found = refusals({**SCENE, "robot": robot}, straight(), kinematic=False)
+    assert (reason in found) if reason is not None else found == []
+
+
+def test_the_checker_ramps_both_velocities_together_where_wheels_limit() -> None:
+    """The right wheel is to change by 0.5 + 0.2 * 0.5 = 0.6 m/s, a third of which its limit allows in 0.1 s."""
+    limits = {"acceleration": 9.0, "angular_acceleration": 9.0, "wheel_separation": 0.4, "wheel_acceleration": 2.0}
+    rows = {name: np.zeros(2) for name in ("x", "y", "theta", "v", "omega")} | {"t": np.array([0.0, 0.1])}
+    rows |= {"v_command": np.full(2, 0.5), "omega_command": np.full(2, 0.5)}
+    _, velocities = driven(rows, limits, kinematic=False)
+    np.testing.assert_allclose(velocities, [[0.0, 0.0, 0.5 / 3.0, 0.5 / 3.0]])
+
+
+@pytest.mark.parametrize(
     "obstacle",
     [
         {"type": "box", "min": [2.5101, -0.5], "max": [2.5102, 0.5]},
