@@ -24,7 +24,7 @@ test: $(VENV)/test.stamp
 # Lines of compiled kernels are not seen: tests of the kernels run again without the compiler, but for those that would
 # take minutes then.
 KERNEL_TESTS := control_laws kernel_laws kinematics manoeuvres disc_tree motion_model motion_check extension nearest \
-	replay wheels occupancy report_sections
+	replay wheels occupancy report_sections trajectory
 TOO_SLOW := thousand or millimetre or MapHolds or BrakeSafe or brake_safe_tree or position_alone or passes_through
 coverage: $(VENV)/test.stamp
 	$(BIN)/coverage erase

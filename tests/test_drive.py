@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from cbrrt_ompl.drive.settings import grown, needed_range, stopping_distance
 from cbrrt_ompl.drive.unknown import load_obstacles, random_obstacles, unknown_obstacles
 from cbrrt_ompl.errors import InputError, ScenarioError, SettingsError
 from cbrrt_ompl.obstacles import Bounds, Box, Disc, Obstacle, OrientedBox, Polygon, signed_distance
+from cbrrt_ompl.planning import PlanResult, plan
 from cbrrt_ompl.robot import Footprint, Limits, Robot
 from cbrrt_ompl.scenario import Scenario
 from cbrrt_ompl.settings import Goal, PlanningSettings, State
@@ -194,6 +196,37 @@ def test_plans_take_no_longer_than_a_cycle_where_time_limits_them() -> None:
     assert [replan.status for replan in result.replans] == ["time limit", "time limit"]
     assert [replan.start_time - replan.time for replan in result.replans] == pytest.approx([0.1, 0.2])
     assert (result.planning_times >= np.array([0.03, 0.09])).all()
+
+
+def test_a_plan_that_comes_late_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a clock that goes on by a second with each look at it."""
+    clock = SimpleNamespace(perf_counter=iter(range(10**6)).__next__)
+    monkeypatch.setattr("cbrrt_ompl.drive.simulation.time", clock)
+    result = drive(hall(), [], DriveSettings(sensor_range=2.5, tries=2), seed=1)
+    assert (result.status, [replan.status for replan in result.replans]) == ("stopped", ["late"] * 2)
+    assert len(np.unique(result.trajectory.states, axis=0)) == 1
+
+
+def test_a_plan_that_cannot_be_braked_from_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By a planner that does not know of the wall in front of the robot."""
+
+    def blind(scenario: Scenario, *arguments: object) -> PlanResult:
+        return plan(replace(scenario, world=World(HALL)), *arguments)
+
+    monkeypatch.setattr("cbrrt_ompl.drive.simulation.plan", blind)
+    wall = Box((1.05, 0.0), (1.15, 4.0))
+    result = drive(hall(wall), [], replace(REPEATABLE, tries=2), seed=1)
+    assert result.status == "stopped"
+    assert [replan.status for replan in result.replans[-2:]] == ["unsafe"] * 2
+    assert_sound(result)
+
+
+def test_progress_is_told_after_every_cycle() -> None:
+    told = []
+    result = drive(hall(), [], REPEATABLE, seed=1, progress=lambda *seen: told.append(seen))
+    assert len(told) == len(result.cycles)
+    assert told[-1][0] == pytest.approx(result.trajectory.duration)
+    assert told[-1][1] < 0.4
 
 
 def test_an_obstacle_is_seen_when_its_nearest_point_comes_into_range() -> None:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -18,10 +17,6 @@ from cbrrt_ompl.settings import MAX_STEPS, PlanningSettings
 
 STEP_TOLERANCE = 1e-6
 """Share of a planning step by which the cycle may differ from whole steps."""
-
-
-BRAKE_SAFE: dict[str, Any] = {"brake_safe": True} if "brake_safe" in {f.name for f in fields(PlanningSettings)} else {}
-"""Where planners know it, they keep only what can be braked from."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +78,7 @@ class DriveSettings:
 
     def planning(self, planning: PlanningSettings) -> PlanningSettings:
         """Planning settings of a drive: those of its scenario, the goal bias and braking without collision."""
-        return replace(planning, goal_bias=self.goal_bias, **BRAKE_SAFE)
+        return replace(planning, goal_bias=self.goal_bias, brake_safe=True)
 
 
 def stopping_distance(robot: Robot, step: float) -> float:
