@@ -18,7 +18,7 @@ NUMBERS: SearchStrategy[Any] = st.one_of(
     st.integers(-10, 10),
     st.floats(),
     st.sampled_from([0.0, -0.0, 1e-320, 1e-9, 1e-6, 1e6, 1e9, 1e308, -1e308, math.nan, math.inf, -math.inf]),
-    st.sampled_from([10**30, -(10**400), 2**31, 2**63, True, False, Fraction(1, 3), 1 + 2j]),
+    st.sampled_from([10**30, -(10**400), 2**31, 2**63, True, False, Fraction(1, 3), Fraction(10**400), 1 + 2j]),
     st.sampled_from([np.float64(0.5), np.float32(0.5), np.float16(2.0), np.int8(1), np.uint64(2**63), np.bool_(True)]),
 )
 """Numbers of every kind and size, good and bad."""

@@ -8,6 +8,7 @@ import struct
 import time
 import zlib
 from collections.abc import Callable
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -447,6 +448,8 @@ def test_a_map_that_cannot_be_written_is_told(tmp_path: Path) -> None:
     ("changes", "words"),
     [
         ({"cells": np.zeros(3)}, "rows and columns"),
+        ({"cells": [[0, 100], [0]]}, "rows and columns"),
+        ({"resolution": Fraction(10**400)}, "resolution: got"),
         ({"cells": np.full((2, 2), 1)}, r"only 100 \(occupied\), 0 \(free\) and -1 \(unknown\)"),
         ({"resolution": 0.0}, "resolution: got 0.0"),
         ({"origin": (0.0, 0.0)}, "origin: got"),

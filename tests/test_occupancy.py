@@ -144,6 +144,7 @@ def test_thresholds_part_likelihoods() -> None:
     [
         (np.zeros(3), "rows and columns"),
         (np.zeros((0, 3)), "rows and columns"),
+        ([[0, 1], [1]], "rows and columns"),
         (np.full((2, 2), 255), "whole numbers from -1 to 100"),
         (np.full((2, 2), 1.5), "likelihoods from 0 to 1"),
         (np.full((2, 2), math.inf), "likelihoods from 0 to 1"),
