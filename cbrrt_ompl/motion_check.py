@@ -197,4 +197,4 @@ def sum_up(findings: NDArray[np.float64], row: int) -> None:
     """Put one finding in place of all from a row on: that everything is free."""
     if int(findings[0, 0]) < len(findings):  # else some are lost
         findings[0, 0] = findings[0, 1] = row
-        findings[row, 0], findings[row, 1] = np.inf, True
+        findings[row, 0] = np.inf

@@ -136,9 +136,10 @@ class TestWhatTheMapHolds:
         for node in free_nodes(world, footprint, 60, seed=9):
             sample = tuple(rng.uniform(-2.0, 2.0, 2).tolist())
             exact = drive(off, node, sample, model)
-            forgetful = ClearanceMap(world, footprint, enabled=False)
-            forgetful.findings = np.zeros((2, 2))  # to be enlarged in mid-extension
-            for clearance_map in (grown, ClearanceMap(world, footprint), forgetful):
+            forgetful = [ClearanceMap(world, footprint, enabled=enabled) for enabled in (True, False)]
+            for clearance_map in forgetful:
+                clearance_map.findings = np.zeros((2, 2))  # to be enlarged in mid-extension
+            for clearance_map in (grown, ClearanceMap(world, footprint), *forgetful):
                 found = drive(clearance_map, node, sample, model)
                 assert found[:3] == exact[:3]
                 assert exact.outcome == BLOCKED or found == exact
@@ -223,6 +224,15 @@ class TestRowsOfStates:
         wall = OrientedBox((4.0 + 0.01 * x * math.cos(angle), 2.0 + 0.01 * x * math.sin(angle)), (0.0011, 1.0), angle)
         for obstacles, free in ((), True), ((wall,), False):
             assert is_free(np.array(rows), 0.05, ClearanceMap(World(self.HALL, obstacles), POINT)) == free
+
+    def test_a_corner_that_turns_into_a_wall_is_seen(self) -> None:
+        square = Footprint.polygon([(-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)])
+        headings = np.linspace(0.0, math.pi / 2.0, 21)  # at 0.5 rad/s
+        turn = np.column_stack([0.0 * headings, 0.0 * headings, headings, 0.0 * headings, 0.5 + 0.0 * headings])
+        bounds, dt = Bounds((-1.0, -1.0), (1.0, 1.0)), (headings[1] - headings[0]) / 0.5
+        for wall, is_expected in ((0.13, False), (0.145, True)):  # the corners pass at 0.1414 m
+            world = World(bounds, [Box((wall, -1.0), (0.3, 1.0))])
+            assert is_free(turn, dt, ClearanceMap(world, square)) is is_expected
 
     @pytest.mark.parametrize("footprint", FOOTPRINTS.values(), ids=FOOTPRINTS)
     def test_a_motion_that_begins_in_an_obstacle_is_not_free(self, footprint: Footprint) -> None:
