@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from cbrrt_ompl.disc_tree import disc_tree
 from cbrrt_ompl.kinematics import sine_cosine
-from cbrrt_ompl.obstacles import Obstacle, bounding_box, signed_distance
+from cbrrt_ompl.obstacles import Obstacle, bounding_box, distance_from_box, signed_distance
 from cbrrt_ompl.robot import Footprint
 from cbrrt_ompl.world import CONTACT_TOLERANCE, MITRE_LIMIT, CollisionChecker, World
 
@@ -281,9 +281,7 @@ class ClearanceMap:
         leaves = self._root + np.flatnonzero(self.children[self._root : self._rows] == 0)
         for obstacle in added:
             x, y, clearance = self.clearances[leaves].T
-            x_min, y_min, x_max, y_max = bounding_box(obstacle)
-            dx, dy = np.maximum(x_min - x, x - x_max), np.maximum(y_min - y, y - y_max)
-            near = np.hypot(np.maximum(dx, 0.0), np.maximum(dy, 0.0)) < np.maximum(clearance, SMALLEST_CELL)
+            near = distance_from_box(bounding_box(obstacle), x, y) < np.maximum(clearance, SMALLEST_CELL)
             distance = signed_distance(obstacle, x[near], y[near])
             self.clearances[leaves[near], 2] = np.minimum(clearance[near], distance)
 

@@ -237,6 +237,27 @@ def bounding_box(obstacle: Obstacle) -> tuple[float, float, float, float]:
     return x_min, y_min, x_max, y_max
 
 
+def distance_from_box(
+    box: tuple[float, float, float, float] | NDArray[np.float64],
+    x: float | NDArray[np.float64],
+    y: float | NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Distances of points from rectangles along the axes, 0 inside: of n points from one, or of one point from n.
+
+    Args:
+        box: x_min, y_min, x_max, y_max, see :func:`bounding_box`, of shape (4,) or (4, n) [m].
+        x: positions, shape (n,) or a number [m].
+        y: positions, shape (n,) or a number [m].
+
+    Returns:
+        Distances, shape (n,) [m].
+    """
+    x_min, y_min, x_max, y_max = box
+    dx, dy = np.maximum(x_min - x, x - x_max), np.maximum(y_min - y, y - y_max)
+    distances: NDArray[np.float64] = np.hypot(np.maximum(dx, 0.0), np.maximum(dy, 0.0))
+    return distances
+
+
 def polygons_from_shapely(geometry: object) -> list[Polygon]:
     """Obstacles of the area of a shapely geometry.
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cbrrt_ompl.clearance_map import ClearanceMap, clearance_map_for, extend_map
-from cbrrt_ompl.obstacles import Obstacle, bounding_box, signed_distance
+from cbrrt_ompl.obstacles import Obstacle, bounding_box, distance_from_box, signed_distance
 from cbrrt_ompl.robot import Footprint
 from cbrrt_ompl.world import World
 
@@ -55,9 +55,7 @@ class Knowledge:
             The obstacles seen for the first time.
         """
         here = np.array([x]), np.array([y])
-        x_min, y_min, x_max, y_max = self._boxes.T
-        dx, dy = np.maximum(x_min - x, x - x_max), np.maximum(y_min - y, y - y_max)
-        is_seen = np.hypot(np.maximum(dx, 0.0), np.maximum(dy, 0.0)) <= sensor_range
+        is_seen = distance_from_box(self._boxes.T, x, y) <= sensor_range
         for i in np.flatnonzero(is_seen):
             is_seen[i] = signed_distance(self.hidden[i], *here)[0] <= sensor_range
         seen = list(compress(self.hidden, is_seen))
