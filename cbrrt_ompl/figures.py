@@ -359,10 +359,7 @@ def draw_plan(result: PlanResult, scenario: Scenario) -> Figure:
     if trajectory is not None:
         draw_trajectory(plane, trajectory, scenario.robot.footprint)
     legend_above(plane)
-    for ax in figure.axes:
-        ax.tick_params(labelsize=8)
-        ax.xaxis.label.set_fontsize(9)
-        ax.yaxis.label.set_fontsize(9)
+    _shrink_labels(figure)
     return figure
 
 
@@ -487,11 +484,16 @@ def draw_drive(result: DriveResult) -> Figure:
     figure.align_ylabels((upper, lower, clock))
     for ax in (plane, upper):
         legend_above(ax)
+    _shrink_labels(figure)
+    return figure
+
+
+def _shrink_labels(figure: Figure) -> None:
+    """Make the labels of all axes small enough for a figure with several."""
     for ax in figure.axes:
         ax.tick_params(labelsize=8)
         ax.xaxis.label.set_fontsize(9)
         ax.yaxis.label.set_fontsize(9)
-    return figure
 
 
 def plan_title(result: PlanResult, scenario: Scenario) -> str:
