@@ -18,7 +18,7 @@ from cbrrt_ompl.motion_model import CLOSED_LOOP, OPEN_LOOP, STEERING, pack_model
 from cbrrt_ompl.obstacles import Bounds, Box, Disc, OrientedBox, Polygon
 from cbrrt_ompl.replay import replay_path
 from cbrrt_ompl.robot import Footprint, Limits, Robot
-from cbrrt_ompl.roll_out import SCRATCH_SHAPE
+from cbrrt_ompl.roll_out import SCRATCH_SHAPE, roll_out
 from cbrrt_ompl.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.world import World
 
@@ -78,6 +78,25 @@ def drive(
         if found.outcome != ASK:
             return found
         clearance_map.answer(*found.control)
+    raise AssertionError("there is no end to the questions")
+
+
+def roll_out_answered(
+    clearance_map: ClearanceMap,
+    node: Sequence[float],
+    control: tuple[float, float, float],
+    model: NDArray[np.float64],
+) -> tuple[int, int, tuple[float, ...]]:
+    """Steps, outcome and last state of a drive under one control, all its questions answered."""
+    scratch = np.empty(SCRATCH_SHAPE)
+    clearance_map.forget_findings()
+    for _ in range(10_000):
+        steps, outcome, state, pose = roll_out(
+            tuple(map(float, node)), control, unpack_model(model), clearance_map.view, clearance_map.findings, scratch
+        )
+        if outcome != ASK:
+            return steps, outcome, state
+        clearance_map.answer(*pose)
     raise AssertionError("there is no end to the questions")
 
 

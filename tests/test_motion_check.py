@@ -21,6 +21,7 @@ from kernels import (
     headings,
     model_of,
     nodes,
+    roll_out_answered,
     samples,
     states_of,
 )
@@ -29,12 +30,11 @@ from cbrrt_ompl import clearance_map as clearance_map_module
 from cbrrt_ompl.clearance_map import ROOM, ClearanceMap
 from cbrrt_ompl.compiled.search import Search
 from cbrrt_ompl.extension import EXTENDED
-from cbrrt_ompl.motion_check import ASK, BLOCKED, is_free
-from cbrrt_ompl.motion_model import OPEN_LOOP, STEERING, unpack_model
+from cbrrt_ompl.motion_check import BLOCKED, is_free
+from cbrrt_ompl.motion_model import OPEN_LOOP, STEERING
 from cbrrt_ompl.obstacles import Bounds, Box, OrientedBox
 from cbrrt_ompl.planning import plan
 from cbrrt_ompl.robot import Footprint, Limits, Robot
-from cbrrt_ompl.roll_out import SCRATCH_SHAPE, roll_out
 from cbrrt_ompl.scenario import Scenario
 from cbrrt_ompl.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.world import World
@@ -102,18 +102,9 @@ def test_no_corner_turns_into_a_wall_beside_the_start(law: int, enabled: bool) -
     """A start with less than `ROOM` has no margin; it was taken for one of the origin alone, which does not turn."""
     square = Footprint.polygon([(-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)])
     world = World(Bounds((-1.0, -1.0), (1.0, 1.0)), [Box((0.1 + 0.6 * ROOM, -1.0), (0.3, 1.0))])
-    clearance_map, outcome = ClearanceMap(world, square, enabled=enabled), ASK
+    clearance_map = ClearanceMap(world, square, enabled=enabled)
     assert not clearance_map.collides(0.0, 0.0, 0.0)
-    while outcome == ASK:
-        steps, outcome, _, pose = roll_out(
-            (0.0, 0.0, 0.0, 0.0, 0.0),
-            (0.0, 0.5, 0.0),
-            unpack_model(model_of(law)),
-            clearance_map.view,
-            clearance_map.findings,
-            np.empty(SCRATCH_SHAPE),
-        )
-        clearance_map.answer(*pose)
+    steps, outcome, _ = roll_out_answered(clearance_map, State(0.0, 0.0), (0.0, 0.5, 0.0), model_of(law))
     assert (steps, outcome) == (0, BLOCKED)
 
 

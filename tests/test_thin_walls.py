@@ -6,21 +6,20 @@ import math
 
 import numpy as np
 import pytest
+from kernels import LAWS, roll_out_answered
 
 from cbrrt_ompl.clearance_map import ClearanceMap
-from cbrrt_ompl.motion_check import ASK, BLOCKED, FREE
-from cbrrt_ompl.motion_model import CLOSED_LOOP, OPEN_LOOP, STEERING, pack_model, unpack_model
+from cbrrt_ompl.motion_check import BLOCKED, FREE
+from cbrrt_ompl.motion_model import CLOSED_LOOP, pack_model
 from cbrrt_ompl.obstacles import Bounds, OrientedBox
 from cbrrt_ompl.planning import plan
 from cbrrt_ompl.robot import Footprint, Limits, Robot
-from cbrrt_ompl.roll_out import SCRATCH_SHAPE, roll_out
 from cbrrt_ompl.scenario import Scenario
 from cbrrt_ompl.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.world import World
 
 THICKNESS = 1e-6
 SPEED = 1.0
-LAWS = {"open loop": OPEN_LOOP, "closed loop": CLOSED_LOOP, "steering": STEERING}
 FOOTPRINTS = {
     "point": Footprint.point(),
     "disc": Footprint.disc(0.1),
@@ -35,19 +34,14 @@ def wall_through(x: float, y: float, normal: float) -> OrientedBox:
 
 def driven_straight(law: int, footprint: Footprint, wall: OrientedBox | None, heading: float) -> tuple[int, float]:
     """Drive 2 m from the origin at 1 m/s, all questions answered by FCL: what came of it and how far it went."""
-    model = unpack_model(pack_model(law, Robot(footprint), Goal(9.0, 9.0), PlanningSettings()))
+    model = pack_model(law, Robot(footprint), Goal(9.0, 9.0), PlanningSettings())
     clearance_map = ClearanceMap(World(Bounds((-10.0, -10.0), (10.0, 10.0)), [wall] if wall else []), footprint)
     node = (0.0, 0.0, heading, SPEED, 0.0)
     control = (SPEED, 0.0, 0.0)
     if law == CLOSED_LOOP:
         control = (5.0 * math.cos(heading), 5.0 * math.sin(heading), heading)
-    scratch = np.empty(SCRATCH_SHAPE)
-    for _ in range(10_000):
-        _, outcome, state, pose = roll_out(node, control, model, clearance_map.view, clearance_map.findings, scratch)
-        if outcome != ASK:
-            return outcome, math.hypot(*state[:2])
-        clearance_map.answer(*pose)
-    raise AssertionError("there is no end to the questions")
+    _, outcome, state = roll_out_answered(clearance_map, node, control, model)
+    return outcome, math.hypot(*state[:2])
 
 
 @pytest.mark.parametrize("footprint", FOOTPRINTS.values(), ids=FOOTPRINTS)
