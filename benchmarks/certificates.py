@@ -20,7 +20,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from test_clearance_map import FOOTPRINTS, WORLDS, border_poses, compare, uniform_poses  # noqa: E402
 
-from cbrrt_ompl.clearance_map import ClearanceMap  # noqa: E402
+from cbrrt_ompl.collision.clearance_map import ClearanceMap  # noqa: E402
 
 FIRST_STATES = 1000
 """States that the map is grown for while the clock runs."""

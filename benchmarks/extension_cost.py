@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 
 from cbrrt_ompl import Bounds, Disc, Goal, Scenario, State, World, load_scenario
-from cbrrt_ompl.clearance_map import ClearanceMap
-from cbrrt_ompl.compiled.search import Search
-from cbrrt_ompl.motion_model import law_of, pack_model
+from cbrrt_ompl.collision.clearance_map import ClearanceMap
+from cbrrt_ompl.motion.model import law_of, pack_model
 from cbrrt_ompl.ompl_plugin.run import run
+from cbrrt_ompl.planners.search import Search
 from cbrrt_ompl.planning import clearance_map_for
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"

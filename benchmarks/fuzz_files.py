@@ -34,10 +34,10 @@ from PIL import Image
 from cbrrt_ompl import cli
 from cbrrt_ompl.errors import InputError
 from cbrrt_ompl.maps import load_map
-from cbrrt_ompl.maps.discs import load_discs
-from cbrrt_ompl.maps.dynobench import load_dynobench
-from cbrrt_ompl.scenario import load_scenario
-from cbrrt_ompl.trajectory import Trajectory
+from cbrrt_ompl.scenario.dynobench import load_dynobench
+from cbrrt_ompl.scenario.maps.discs import load_discs
+from cbrrt_ompl.scenario.scenario import load_scenario
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 
 ALARM = 5
 """Time after which a case hangs [s]."""
@@ -361,9 +361,9 @@ def run_batch(seed: int, first: int, last: int) -> list[tuple[int, str, str, str
 
 def prepare_worker() -> None:
     """Load all libraries, then limit the memory."""
-    from cbrrt_ompl.warm_up import warm_up
+    from cbrrt_ompl.planners.warm_up import warm_up
 
-    warm_up(needs_ompl=False)
+    warm_up()
     run_batch(0, 0, 2 * len(kinds()))
     mapped = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (mapped + MEMORY, mapped + MEMORY))

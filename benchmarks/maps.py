@@ -32,10 +32,10 @@ from cbrrt_ompl import (
     plan,
     verify,
 )
-from cbrrt_ompl.maps.discs import load_discs
-from cbrrt_ompl.maps.dynobench import load_dynobench
-from cbrrt_ompl.maps.loading import load_map
-from cbrrt_ompl.maps.occupancy_map import OccupancyMap
+from cbrrt_ompl.scenario.dynobench import load_dynobench
+from cbrrt_ompl.scenario.maps.discs import load_discs
+from cbrrt_ompl.scenario.maps.loading import load_map
+from cbrrt_ompl.scenario.maps.occupancy_map import OccupancyMap
 
 WAFFLE_PI, JACKAL = ROBOTS["turtlebot3_waffle_pi"], ROBOTS["jackal"]
 MAP_PLANNING = PlanningSettings(horizon=2.0, step=0.05, goal_bias=0.05, max_samples=10**9)

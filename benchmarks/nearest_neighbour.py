@@ -13,7 +13,7 @@ import argparse
 
 import numpy as np
 
-from cbrrt_ompl.compiled.nearest import KINDS
+from cbrrt_ompl.planners.nearest import KINDS
 from cbrrt_ompl.reproduce.neighbours import query_cost
 
 

@@ -9,18 +9,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from cbrrt_ompl.collision.world import World
     from cbrrt_ompl.errors import CbrrtError, InputError
-    from cbrrt_ompl.maps import OccupancyMap, load_map, save_map
-    from cbrrt_ompl.obstacles import Bounds, Box, Disc, OrientedBox, Polygon
+    from cbrrt_ompl.maps import OccupancyMap, load_dynobench, load_map, save_map
     from cbrrt_ompl.ompl_plugin.setup import make_setup
     from cbrrt_ompl.planning import PlanResult, plan
-    from cbrrt_ompl.robot import Footprint, Gains, Limits, Robot
-    from cbrrt_ompl.robots import ROBOTS
-    from cbrrt_ompl.scenario import Scenario, load_scenario, save_scenario
-    from cbrrt_ompl.settings import Goal, PlanningSettings, State
-    from cbrrt_ompl.trajectory import Trajectory
+    from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, OrientedBox, Polygon
+    from cbrrt_ompl.problem.ready_robots import ROBOTS
+    from cbrrt_ompl.problem.robot import Footprint, Gains, Limits, Robot
+    from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
+    from cbrrt_ompl.scenario.scenario import Scenario, load_scenario, save_scenario
+    from cbrrt_ompl.trajectory.trajectory import Trajectory
     from cbrrt_ompl.verification import verify
-    from cbrrt_ompl.world import World
 
     __version__: str
 
@@ -46,6 +46,7 @@ __all__ = [
     "Trajectory",
     "World",
     "__version__",
+    "load_dynobench",
     "load_map",
     "load_scenario",
     "make_setup",
@@ -56,18 +57,18 @@ __all__ = [
 ]
 
 _MODULES = {
+    "collision.world": ("World",),
     "errors": ("CbrrtError", "InputError"),
-    "maps": ("OccupancyMap", "load_map", "save_map"),
-    "obstacles": ("Bounds", "Box", "Disc", "OrientedBox", "Polygon"),
     "ompl_plugin.setup": ("make_setup",),
     "planning": ("PlanResult", "plan"),
-    "robot": ("Footprint", "Gains", "Limits", "Robot"),
-    "robots": ("ROBOTS",),
-    "scenario": ("Scenario", "load_scenario", "save_scenario"),
-    "settings": ("Goal", "PlanningSettings", "State"),
-    "trajectory": ("Trajectory",),
+    "problem.obstacles": ("Bounds", "Box", "Disc", "OrientedBox", "Polygon"),
+    "problem.ready_robots": ("ROBOTS",),
+    "problem.robot": ("Footprint", "Gains", "Limits", "Robot"),
+    "problem.settings": ("Goal", "PlanningSettings", "State"),
+    "maps": ("OccupancyMap", "load_dynobench", "load_map", "save_map"),
+    "scenario.scenario": ("Scenario", "load_scenario", "save_scenario"),
+    "trajectory.trajectory": ("Trajectory",),
     "verification": ("verify",),
-    "world": ("World",),
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names}
 

@@ -12,16 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from cbrrt_ompl.clearance_map import clearance_map_for
-from cbrrt_ompl.compiled.search import COMPILED_PLANNERS, ROBUST, Search
+from cbrrt_ompl.checks import is_number
+from cbrrt_ompl.collision.clearance_map import clearance_map_for
 from cbrrt_ompl.errors import Problem, SettingsError, UnknownPlannerError
-from cbrrt_ompl.motion_model import check_step, law_of, pack_model
-from cbrrt_ompl.replay import trajectory_from_controls
-from cbrrt_ompl.scenario import Scenario, check_scenario
-from cbrrt_ompl.sections import is_number
-from cbrrt_ompl.trajectory import Trajectory
-from cbrrt_ompl.tree import Tree
-from cbrrt_ompl.warm_up import warm_up
+from cbrrt_ompl.motion.model import check_step, law_of, pack_model
+from cbrrt_ompl.planners.search import COMPILED_PLANNERS, ROBUST, Search
+from cbrrt_ompl.planners.warm_up import warm_up
+from cbrrt_ompl.scenario.scenario import Scenario, check_scenario
+from cbrrt_ompl.trajectory.replay import trajectory_from_controls
+from cbrrt_ompl.trajectory.trajectory import Trajectory
+from cbrrt_ompl.trajectory.tree import Tree
 
 PLANNERS: dict[str, str] = {
     "cb-rrt": "CB-RRT of the paper: the Kanayama law in OMPL's control::RRT",
@@ -115,13 +115,22 @@ def plan(
         raise UnknownPlannerError(planner, list(PLANNERS))
     _check_arguments(seed, time_limit, progress)
     check_step(scenario.robot, scenario.planning)
-    warm_up(needs_ompl=planner not in COMPILED_PLANNERS)
+    warm_up_planner(planner)
     watch = _Watch(time_limit, progress)
     if not scenario.goal.violations(scenario.start):
         return _already_there(scenario, planner, seed)
     if planner in COMPILED_PLANNERS:
         return _plan_compiled(scenario, planner, seed, watch)
     return _plan_in_ompl(scenario, planner, seed, watch)
+
+
+def warm_up_planner(planner: str) -> None:
+    """Load or compile all kernels that a planner needs, before a clock runs."""
+    warm_up()
+    if planner not in COMPILED_PLANNERS:
+        from cbrrt_ompl.ompl_plugin import warm_up as plugin  # here, so that the compiled planners need no OMPL
+
+        plugin.warm_up()
 
 
 def _check_arguments(seed: object, time_limit: object, progress: object) -> None:

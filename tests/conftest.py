@@ -27,6 +27,6 @@ def scenarios(repository: Path) -> Path:
 @pytest.fixture(scope="session", autouse=True)
 def _compiled_kernels() -> None:
     """Compile once, so that no test waits for it or meets the message about it."""
-    from cbrrt_ompl.warm_up import warm_up
+    from cbrrt_ompl.planning import warm_up_planner
 
-    warm_up(needs_ompl=True)
+    warm_up_planner("cb-rrt")

@@ -10,17 +10,17 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from cbrrt_ompl.clearance_map import ClearanceMap
-from cbrrt_ompl.extension import Extension, extend
-from cbrrt_ompl.kinematics import unicycle_step
-from cbrrt_ompl.motion_check import ASK
-from cbrrt_ompl.motion_model import CLOSED_LOOP, OPEN_LOOP, STEERING, pack_model, unpack_model
-from cbrrt_ompl.obstacles import Bounds, Box, Disc, OrientedBox, Polygon
-from cbrrt_ompl.replay import replay_path
-from cbrrt_ompl.robot import Footprint, Limits, Robot
-from cbrrt_ompl.roll_out import SCRATCH_SHAPE, roll_out
-from cbrrt_ompl.settings import Goal, PlanningSettings, State
-from cbrrt_ompl.world import World
+from cbrrt_ompl.collision.clearance_map import ClearanceMap
+from cbrrt_ompl.collision.motion_check import ASK
+from cbrrt_ompl.collision.world import World
+from cbrrt_ompl.motion.kinematics import unicycle_step
+from cbrrt_ompl.motion.model import CLOSED_LOOP, OPEN_LOOP, STEERING, pack_model, unpack_model
+from cbrrt_ompl.planners.extension import Extension, extend
+from cbrrt_ompl.planners.roll_out import SCRATCH_SHAPE, roll_out
+from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, OrientedBox, Polygon
+from cbrrt_ompl.problem.robot import Footprint, Limits, Robot
+from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
+from cbrrt_ompl.trajectory.replay import replay_path
 
 LAWS = {"open loop": OPEN_LOOP, "closed loop": CLOSED_LOOP, "steering": STEERING}
 LIMITS = Limits()

@@ -11,7 +11,7 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
-from cbrrt_ompl.robot import Limits
+from cbrrt_ompl.problem.robot import Limits
 
 NUMBERS: SearchStrategy[Any] = st.one_of(
     st.floats(-10.0, 10.0),

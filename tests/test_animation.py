@@ -9,18 +9,18 @@ import pytest
 from matplotlib.animation import FFMpegWriter, FuncAnimation
 from PIL import Image
 
-from cbrrt_ompl import animation as module
-from cbrrt_ompl.animation import animate, animate_drive, frame_times, save_animation
+from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.drive import DriveResult, DriveSettings, drive
 from cbrrt_ompl.errors import InputError
-from cbrrt_ompl.figures import draw_drive
-from cbrrt_ompl.obstacles import Bounds, Box
+from cbrrt_ompl.figures import animation as module
+from cbrrt_ompl.figures.animation import animate, animate_drive, frame_times, save_animation
+from cbrrt_ompl.figures.figures import draw_drive
 from cbrrt_ompl.planning import plan
-from cbrrt_ompl.robot import Footprint, Limits, Robot
-from cbrrt_ompl.scenario import Scenario
-from cbrrt_ompl.settings import Goal, PlanningSettings, State
-from cbrrt_ompl.trajectory import Trajectory
-from cbrrt_ompl.world import World
+from cbrrt_ompl.problem.obstacles import Bounds, Box
+from cbrrt_ompl.problem.robot import Footprint, Limits, Robot
+from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
+from cbrrt_ompl.scenario.scenario import Scenario
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 
 BOX = Box((4.0, 1.0), (4.4, 3.0))
 

@@ -30,9 +30,9 @@ from cbrrt_ompl import (
     save_scenario,
     verify,
 )
-from cbrrt_ompl.figures import draw_plan
-from cbrrt_ompl.replay import MAX_EDGE_POINTS
-from cbrrt_ompl.world import Obstacle
+from cbrrt_ompl.collision.world import Obstacle
+from cbrrt_ompl.figures.figures import draw_plan
+from cbrrt_ompl.trajectory.replay import MAX_EDGE_POINTS
 
 PLANNERS = ("cb-rrt-compiled", "s-rrt-compiled", "cb-rrt-robust", "cb-rrt", "rrt", "pdst")
 

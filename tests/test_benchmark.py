@@ -34,10 +34,10 @@ from cbrrt_ompl.benchmark.database import write_database
 from cbrrt_ompl.benchmark.experiment import Experiment
 from cbrrt_ompl.benchmark.local import run_locally
 from cbrrt_ompl.benchmark.log import Log, PlannerLog, format_log, merge_logs, parse_log, read_log
-from cbrrt_ompl.clearance_map import ClearanceMap
 from cbrrt_ompl.cli import main
+from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from cbrrt_ompl.errors import CbrrtError, InputError, SettingsError, UnknownPlannerError
-from cbrrt_ompl.motion_model import OPEN_LOOP, STEERING
+from cbrrt_ompl.motion.model import OPEN_LOOP, STEERING
 from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
 from cbrrt_ompl.ompl_plugin.samplers import ExtensionSampler
 from cbrrt_ompl.planning import PLANNERS

@@ -10,11 +10,19 @@ import numpy as np
 import pytest
 from kernels import findings
 
-from cbrrt_ompl import clearance_map as module
-from cbrrt_ompl.clearance_map import COLLISION, ROOM, UNDECIDED, ClearanceMap, certify, certify_pose, clearance_map_for
-from cbrrt_ompl.obstacles import Bounds, Box, Disc, Obstacle, OrientedBox, Polygon
-from cbrrt_ompl.robot import Footprint
-from cbrrt_ompl.world import World
+from cbrrt_ompl.collision import clearance_map as module
+from cbrrt_ompl.collision.clearance_map import (
+    COLLISION,
+    ROOM,
+    UNDECIDED,
+    ClearanceMap,
+    certify,
+    certify_pose,
+    clearance_map_for,
+)
+from cbrrt_ompl.collision.world import World
+from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, Obstacle, OrientedBox, Polygon
+from cbrrt_ompl.problem.robot import Footprint
 
 NEAR = 0.01
 """What counts as near the boundary of validity [m]."""

@@ -13,12 +13,14 @@ from pathlib import Path
 
 import pytest
 
-from cbrrt_ompl import __version__, demo, figures, planning
+from cbrrt_ompl import __version__, planning
 from cbrrt_ompl.cli import build_parser, main, program
 from cbrrt_ompl.cli.output_files import SUFFIXES
 from cbrrt_ompl.errors import InputError, Problem
-from cbrrt_ompl.scenario import load_scenario
-from cbrrt_ompl.trajectory import Trajectory
+from cbrrt_ompl.figures import figures
+from cbrrt_ompl.reproduce import demo
+from cbrrt_ompl.scenario.scenario import load_scenario
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.verification import verify
 
 COMMANDS = [module.__name__.rpartition(".")[2] for module in program.COMMANDS]
@@ -462,7 +464,7 @@ def test_compilation_is_told_of_on_a_terminal_only(
     def stop(*_: object, **__: object) -> None:
         raise InputError(Problem("test", 1, "no plan"))
 
-    monkeypatch.setattr("cbrrt_ompl.warm_up.warm_up", lambda needs_ompl: time.sleep(1.3))
+    monkeypatch.setattr("cbrrt_ompl.planning.warm_up_planner", lambda planner: time.sleep(1.3))
     monkeypatch.setattr(planning, "plan", stop)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
     assert main(["plan", str(open_file)]) == 2

@@ -14,17 +14,17 @@ import pytest
 from numpy.typing import NDArray
 
 from cbrrt_ompl import load_scenario, make_setup, plan, verify
-from cbrrt_ompl.clearance_map import ClearanceMap
-from cbrrt_ompl.compiled.planner import CompiledPlanner
-from cbrrt_ompl.compiled.search import Search
-from cbrrt_ompl.motion_model import law_of, pack_model
-from cbrrt_ompl.obstacles import Bounds, Box
+from cbrrt_ompl.collision.clearance_map import ClearanceMap
+from cbrrt_ompl.collision.world import World
+from cbrrt_ompl.motion.model import law_of, pack_model
 from cbrrt_ompl.ompl_plugin.binding import ob, oc, ot, ou
-from cbrrt_ompl.robot import Limits, Robot
-from cbrrt_ompl.scenario import Scenario
-from cbrrt_ompl.settings import NEAREST_NEIGHBOUR, Goal, PlanningSettings, State
-from cbrrt_ompl.tree import Tree
-from cbrrt_ompl.world import World
+from cbrrt_ompl.ompl_plugin.compiled_planner import CompiledPlanner
+from cbrrt_ompl.planners.search import Search
+from cbrrt_ompl.problem.obstacles import Bounds, Box
+from cbrrt_ompl.problem.robot import Limits, Robot
+from cbrrt_ompl.problem.settings import NEAREST_NEIGHBOUR, Goal, PlanningSettings, State
+from cbrrt_ompl.scenario.scenario import Scenario
+from cbrrt_ompl.trajectory.tree import Tree
 
 COMPILED_PLANNERS = ["cb-rrt-compiled", "s-rrt-compiled"]
 BOUNDS = Bounds((0.0, 0.0), (10.0, 10.0))
@@ -127,7 +127,7 @@ def test_a_search_stops_within_an_extension_and_goes_on_as_if_it_had_not(
     scenario = load_scenario(scenarios / "office.yaml")
     scenario = replace(scenario, planning=replace(scenario.planning, brake_safe=True))
     whole = grow(scenario, "cb-rrt-compiled", 3, 12, clearance_map(scenario, enabled=False))
-    monkeypatch.setattr("cbrrt_ompl.compiled.search.PAUSE", 0.0)
+    monkeypatch.setattr("cbrrt_ompl.planners.search.PAUSE", 0.0)
     model = pack_model(law_of("cb-rrt-compiled", scenario.planning), scenario.robot, scenario.goal, scenario.planning)
     search = Search(model, clearance_map(scenario, enabled=False), [scenario.start], 3)
     asked = []

@@ -10,15 +10,15 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from kernels import plain
 
-from cbrrt_ompl.control_laws import (
+from cbrrt_ompl.motion.control_laws import (
     error_posture,
     kanayama_command,
     reference_pose,
     steering_rate,
     tracking_command,
 )
-from cbrrt_ompl.kinematics import dynamic_step, kinematic_step
-from cbrrt_ompl.robot import Gains, Limits
+from cbrrt_ompl.motion.kinematics import dynamic_step, kinematic_step
+from cbrrt_ompl.problem.robot import Gains, Limits
 
 Pose = tuple[float, float, float]
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import shapely
 
-from cbrrt_ompl.disc_tree import COLUMNS, disc_tree
-from cbrrt_ompl.robot import Footprint
+from cbrrt_ompl.collision.disc_tree import COLUMNS, disc_tree
+from cbrrt_ompl.problem.robot import Footprint
 
 GROWTH = 1e-6
 SLIVER = 1e-9

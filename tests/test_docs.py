@@ -18,12 +18,12 @@ from test_package import tomllib
 from test_readme import blocks
 
 import cbrrt_ompl
-from cbrrt_ompl import scenario_file
 from cbrrt_ompl.cli import build_parser
-from cbrrt_ompl.robot import Gains, Limits
-from cbrrt_ompl.scenario import load_scenario
-from cbrrt_ompl.sections import Key
-from cbrrt_ompl.settings import Goal, PlanningSettings, State
+from cbrrt_ompl.problem.robot import Gains, Limits
+from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
+from cbrrt_ompl.scenario import scenario_file
+from cbrrt_ompl.scenario.scenario import load_scenario
+from cbrrt_ompl.scenario.sections import Key
 
 SECTIONS: dict[str, Mapping[str, Key]] = {
     "Top level": scenario_file.SCENARIO,

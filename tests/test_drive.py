@@ -12,19 +12,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cbrrt_ompl.clearance_map import ClearanceMap, clearance_map_for, extend_map
+from cbrrt_ompl.collision.clearance_map import ClearanceMap, clearance_map_for, extend_map
+from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.drive import Drive, DriveResult, DriveSettings, drive
 from cbrrt_ompl.drive.knowledge import Knowledge
 from cbrrt_ompl.drive.settings import grown, needed_range, stopping_distance
 from cbrrt_ompl.drive.unknown import load_obstacles, random_obstacles, unknown_obstacles
 from cbrrt_ompl.errors import InputError, ScenarioError, SettingsError
-from cbrrt_ompl.obstacles import Bounds, Box, Disc, Obstacle, OrientedBox, Polygon, signed_distance
 from cbrrt_ompl.planning import PlanResult, plan
-from cbrrt_ompl.robot import Footprint, Limits, Robot
-from cbrrt_ompl.scenario import Scenario
-from cbrrt_ompl.settings import Goal, PlanningSettings, State
-from cbrrt_ompl.trajectory import Trajectory
-from cbrrt_ompl.world import World
+from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, Obstacle, OrientedBox, Polygon, signed_distance
+from cbrrt_ompl.problem.robot import Footprint, Limits, Robot
+from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
+from cbrrt_ompl.scenario.scenario import Scenario
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 
 START = State(0.8, 2.0)
 HALL = Bounds((0.0, 0.0), (8.0, 4.0))

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from cbrrt_ompl import animation
 from cbrrt_ompl.cli import main
-from cbrrt_ompl.trajectory import Trajectory
+from cbrrt_ompl.figures import animation
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 
 HALL = """
 name: hall

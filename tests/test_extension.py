@@ -25,16 +25,16 @@ from kernels import (
     states_of,
 )
 
-from cbrrt_ompl.clearance_map import ClearanceMap
-from cbrrt_ompl.control_laws import reference_pose, tracking_command
-from cbrrt_ompl.extension import EXTENDED, REFUSED, extend, is_refused
-from cbrrt_ompl.kinematics import dynamic_step
-from cbrrt_ompl.motion_check import BLOCKED
-from cbrrt_ompl.motion_model import CLOSED_LOOP, OPEN_LOOP, STEERING, in_goal, unpack_model
-from cbrrt_ompl.obstacles import Bounds, Box
-from cbrrt_ompl.robot import Footprint, Gains
-from cbrrt_ompl.settings import Goal, State
-from cbrrt_ompl.world import World
+from cbrrt_ompl.collision.clearance_map import ClearanceMap
+from cbrrt_ompl.collision.motion_check import BLOCKED
+from cbrrt_ompl.collision.world import World
+from cbrrt_ompl.motion.control_laws import reference_pose, tracking_command
+from cbrrt_ompl.motion.kinematics import dynamic_step
+from cbrrt_ompl.motion.model import CLOSED_LOOP, OPEN_LOOP, STEERING, in_goal, unpack_model
+from cbrrt_ompl.planners.extension import EXTENDED, REFUSED, extend, is_refused
+from cbrrt_ompl.problem.obstacles import Bounds, Box
+from cbrrt_ompl.problem.robot import Footprint, Gains
+from cbrrt_ompl.problem.settings import Goal, State
 
 
 class TestRefusal:

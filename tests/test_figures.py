@@ -21,7 +21,8 @@ from matplotlib.patches import Circle, Wedge
 from matplotlib.patches import Polygon as PolygonPatch
 from numpy.typing import NDArray
 
-from cbrrt_ompl.figures import (
+from cbrrt_ompl.collision.world import World
+from cbrrt_ompl.figures.figures import (
     PATH_COLOR,
     TREE_COLOR,
     TURN_COLOR,
@@ -33,15 +34,14 @@ from cbrrt_ompl.figures import (
     draw_velocities,
     draw_world,
 )
-from cbrrt_ompl.motion_model import OPEN_LOOP, STEERING, pack_model
-from cbrrt_ompl.obstacles import Bounds, Box, Disc, Obstacle, Polygon
+from cbrrt_ompl.motion.model import OPEN_LOOP, STEERING, pack_model
 from cbrrt_ompl.planning import PlanResult
-from cbrrt_ompl.robot import Footprint, Limits, Robot
-from cbrrt_ompl.scenario import Scenario
-from cbrrt_ompl.settings import Goal, PlanningSettings, State
-from cbrrt_ompl.trajectory import Trajectory
-from cbrrt_ompl.tree import Tree
-from cbrrt_ompl.world import World
+from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, Obstacle, Polygon
+from cbrrt_ompl.problem.robot import Footprint, Limits, Robot
+from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
+from cbrrt_ompl.scenario.scenario import Scenario
+from cbrrt_ompl.trajectory.trajectory import Trajectory
+from cbrrt_ompl.trajectory.tree import Tree
 
 SQUARE = Footprint.polygon([[-0.2, -0.2], [0.2, -0.2], [0.2, 0.2], [-0.2, 0.2]])
 

@@ -39,10 +39,10 @@ from cbrrt_ompl import (
     save_scenario,
     verify,
 )
-from cbrrt_ompl.maps.discs import load_discs
-from cbrrt_ompl.maps.dynobench import load_dynobench
-from cbrrt_ompl.scenario import scenario_from_dict, scenario_to_dict
-from cbrrt_ompl.settings import MAX_SAMPLES
+from cbrrt_ompl.problem.settings import MAX_SAMPLES
+from cbrrt_ompl.scenario.dynobench import load_dynobench
+from cbrrt_ompl.scenario.maps.discs import load_discs
+from cbrrt_ompl.scenario.scenario import scenario_from_dict, scenario_to_dict
 
 ROW = np.array([0.0, 1.0])
 TRIANGLE = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from kernels import findings
 from strategies import SHARES, WHEELED
 
-from cbrrt_ompl import clearance_map
-from cbrrt_ompl.clearance_map import (
+from cbrrt_ompl.collision import clearance_map
+from cbrrt_ompl.collision.clearance_map import (
     COLLISION,
     GOOD_MARGIN,
     ROOM,
@@ -23,9 +23,9 @@ from cbrrt_ompl.clearance_map import (
     certify_pose,
     find_leaf,
 )
-from cbrrt_ompl.compiled.search import Search
-from cbrrt_ompl.disc_tree import disc_tree
-from cbrrt_ompl.kinematics import (
+from cbrrt_ompl.collision.disc_tree import disc_tree
+from cbrrt_ompl.collision.world import World
+from cbrrt_ompl.motion.kinematics import (
     dynamic_step,
     joint_ramp,
     joint_ramp_time,
@@ -35,12 +35,12 @@ from cbrrt_ompl.kinematics import (
     stopping_time,
     unicycle_step,
 )
-from cbrrt_ompl.manoeuvres import BRAKE, FORWARD, REVERSE, approach_command, has_ended, is_manoeuvre, most_steps
-from cbrrt_ompl.motion_model import OPEN_LOOP, pack_model
-from cbrrt_ompl.obstacles import Bounds, Box, Disc
-from cbrrt_ompl.robot import Footprint, Limits, Robot
-from cbrrt_ompl.settings import Goal, PlanningSettings, State
-from cbrrt_ompl.world import World
+from cbrrt_ompl.motion.manoeuvres import BRAKE, FORWARD, REVERSE, approach_command, has_ended, is_manoeuvre, most_steps
+from cbrrt_ompl.motion.model import OPEN_LOOP, pack_model
+from cbrrt_ompl.planners.search import Search
+from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc
+from cbrrt_ompl.problem.robot import Footprint, Limits, Robot
+from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 
 DT = 0.05
 EITHER = Limits(-0.6, 1.0, -2.0, 3.0, 0.9, 2.5, wheel_separation=0.4, wheel_speed=0.5, wheel_acceleration=0.7)

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from kernels import plain
 
-from cbrrt_ompl.kinematics import clamp, dynamic_step, kinematic_step, ramp, unicycle_step, wrap_angle
-from cbrrt_ompl.robot import Limits
+from cbrrt_ompl.motion.kinematics import clamp, dynamic_step, kinematic_step, ramp, unicycle_step, wrap_angle
+from cbrrt_ompl.problem.robot import Limits
 
 Pose = tuple[float, float, float]
 

@@ -12,17 +12,17 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from cbrrt_ompl import load_scenario, make_setup, plan, verify
-from cbrrt_ompl.kinematics import dynamic_step, saturate
-from cbrrt_ompl.manoeuvres import BRAKE, FORWARD, REVERSE, has_ended, most_steps, next_velocity
-from cbrrt_ompl.motion_model import OPEN_LOOP, STEERING, pack_model
-from cbrrt_ompl.obstacles import Bounds, Box
+from cbrrt_ompl.collision.world import World
+from cbrrt_ompl.motion.kinematics import dynamic_step, saturate
+from cbrrt_ompl.motion.manoeuvres import BRAKE, FORWARD, REVERSE, has_ended, most_steps, next_velocity
+from cbrrt_ompl.motion.model import OPEN_LOOP, STEERING, pack_model
 from cbrrt_ompl.ompl_plugin.binding import ob
-from cbrrt_ompl.replay import trajectory_from_controls
-from cbrrt_ompl.robot import Footprint, Limits, Robot
-from cbrrt_ompl.scenario import Scenario
-from cbrrt_ompl.settings import Goal, PlanningSettings, State
-from cbrrt_ompl.trajectory import Trajectory
-from cbrrt_ompl.world import World
+from cbrrt_ompl.problem.obstacles import Bounds, Box
+from cbrrt_ompl.problem.robot import Footprint, Limits, Robot
+from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
+from cbrrt_ompl.scenario.scenario import Scenario
+from cbrrt_ompl.trajectory.replay import trajectory_from_controls
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 
 DT = 0.05
 OURS = ["cb-rrt", "s-rrt", "cb-rrt-compiled", "s-rrt-compiled", "cb-rrt-robust"]

@@ -20,12 +20,12 @@ from hypothesis.extra.numpy import array_shapes, arrays
 from numpy.typing import NDArray
 from PIL import Image
 
+from cbrrt_ompl.collision.world import Bounds, Box, Disc, Polygon, World
 from cbrrt_ompl.errors import InputError, MapError
 from cbrrt_ompl.maps import OccupancyMap, load_discs, load_dynobench, load_map, rasterize, save_map
-from cbrrt_ompl.obstacles import Obstacle, OrientedBox
-from cbrrt_ompl.robot import Footprint, Limits
-from cbrrt_ompl.scenario import load_scenario
-from cbrrt_ompl.world import Bounds, Box, Disc, Polygon, World
+from cbrrt_ompl.problem.obstacles import Obstacle, OrientedBox
+from cbrrt_ompl.problem.robot import Footprint, Limits
+from cbrrt_ompl.scenario.scenario import load_scenario
 
 X, F, U = 100, 0, -1
 GREYS = np.array([(0, 254, 205, 254), (254, 254, 0, 0), (0, 254, 254, 254)], dtype=np.uint8)  # the upper row first
@@ -669,7 +669,7 @@ def test_the_reference_path_of_a_barn_world_is_free(number: int) -> None:
 @needs_real_maps
 @pytest.mark.parametrize("name", ["bugtrap_0", "kink_0", "parallelpark_0"])
 def test_the_published_path_of_a_dynobench_problem_is_free_and_arrives(name: str) -> None:
-    from cbrrt_ompl.plain_yaml import read_yaml
+    from cbrrt_ompl.scenario.plain_yaml import read_yaml
 
     folder = REAL_MAPS / "dynobench"
     scenario = load_dynobench(folder / f"{name}.yaml", folder / "unicycle2_v0.yaml")

@@ -26,18 +26,18 @@ from kernels import (
     states_of,
 )
 
-from cbrrt_ompl import clearance_map as clearance_map_module
-from cbrrt_ompl.clearance_map import ROOM, ClearanceMap
-from cbrrt_ompl.compiled.search import Search
-from cbrrt_ompl.extension import EXTENDED
-from cbrrt_ompl.motion_check import BLOCKED, is_free
-from cbrrt_ompl.motion_model import OPEN_LOOP, STEERING
-from cbrrt_ompl.obstacles import Bounds, Box, OrientedBox
+from cbrrt_ompl.collision import clearance_map as clearance_map_module
+from cbrrt_ompl.collision.clearance_map import ROOM, ClearanceMap
+from cbrrt_ompl.collision.motion_check import BLOCKED, is_free
+from cbrrt_ompl.collision.world import World
+from cbrrt_ompl.motion.model import OPEN_LOOP, STEERING
+from cbrrt_ompl.planners.extension import EXTENDED
+from cbrrt_ompl.planners.search import Search
 from cbrrt_ompl.planning import plan
-from cbrrt_ompl.robot import Footprint, Limits, Robot
-from cbrrt_ompl.scenario import Scenario
-from cbrrt_ompl.settings import Goal, PlanningSettings, State
-from cbrrt_ompl.world import World
+from cbrrt_ompl.problem.obstacles import Bounds, Box, OrientedBox
+from cbrrt_ompl.problem.robot import Footprint, Limits, Robot
+from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
+from cbrrt_ompl.scenario.scenario import Scenario
 
 
 class TestThinWalls:

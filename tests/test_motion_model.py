@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from kernels import LAWS, coordinates, model_of, plain
 
 from cbrrt_ompl.errors import SettingsError
-from cbrrt_ompl.kinematics import unicycle_step
-from cbrrt_ompl.motion_model import (
+from cbrrt_ompl.motion.kinematics import unicycle_step
+from cbrrt_ompl.motion.model import (
     CLOSED_LOOP,
     OPEN_LOOP,
     STEERING,
@@ -23,8 +23,8 @@ from cbrrt_ompl.motion_model import (
     pack_model,
     unpack_model,
 )
-from cbrrt_ompl.robot import Gains, Limits, Robot
-from cbrrt_ompl.settings import Goal, PlanningSettings, State
+from cbrrt_ompl.problem.robot import Gains, Limits, Robot
+from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 
 
 class TestModel:

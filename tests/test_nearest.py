@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
-from cbrrt_ompl.compiled.nearest import BRUTE_FORCE, GRID, KD_TREE, Index, insert, nearest
+from cbrrt_ompl.planners.nearest import BRUTE_FORCE, GRID, KD_TREE, Index, insert, nearest
 
 KINDS = pytest.mark.parametrize("kind", [GRID, KD_TREE, BRUTE_FORCE], ids=["grid", "k-d tree", "brute force"])
 

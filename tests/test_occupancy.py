@@ -12,11 +12,11 @@ from hypothesis import example, given
 from hypothesis.extra.numpy import array_shapes, arrays
 from numpy.typing import ArrayLike, NDArray
 
+from cbrrt_ompl.collision.occupancy import covering_rectangles, grid_bounds, grid_obstacles
+from cbrrt_ompl.collision.world import Bounds, Box, Disc, World
 from cbrrt_ompl.errors import MapError, WorldError
-from cbrrt_ompl.obstacles import Obstacle, OrientedBox, Polygon
-from cbrrt_ompl.occupancy import covering_rectangles, grid_bounds, grid_obstacles
-from cbrrt_ompl.robot import Footprint
-from cbrrt_ompl.world import Bounds, Box, Disc, World
+from cbrrt_ompl.problem.obstacles import Obstacle, OrientedBox, Polygon
+from cbrrt_ompl.problem.robot import Footprint
 
 grids = arrays(np.bool_, array_shapes(min_dims=2, max_dims=2, max_side=12))
 ASYMMETRIC = np.array([(1, 0, 0, 0, 0), (1, 0, 0, 1, 0), (0, 0, 0, 0, 0)], dtype=bool)  # an L's foot lies at row 0

@@ -19,10 +19,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from cbrrt_ompl import load_scenario, make_setup, plan
-from cbrrt_ompl.clearance_map import ClearanceMap
+from cbrrt_ompl.collision.clearance_map import ClearanceMap
+from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import UnknownPlannerError
-from cbrrt_ompl.motion_model import GoalRegion, in_goal
-from cbrrt_ompl.obstacles import Bounds, Box
+from cbrrt_ompl.motion.model import GoalRegion, in_goal
 from cbrrt_ompl.ompl_plugin.binding import ob, oc, ou
 from cbrrt_ompl.ompl_plugin.goals import PoseGoal, make_goal
 from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
@@ -44,10 +44,10 @@ from cbrrt_ompl.ompl_plugin.setup import (
 )
 from cbrrt_ompl.ompl_plugin.space import make_state_space, set_state
 from cbrrt_ompl.ompl_plugin.validity import FclStateValidityChecker
-from cbrrt_ompl.robot import Limits
-from cbrrt_ompl.scenario import Scenario
-from cbrrt_ompl.settings import Goal, PlanningSettings, State
-from cbrrt_ompl.world import World
+from cbrrt_ompl.problem.obstacles import Bounds, Box
+from cbrrt_ompl.problem.robot import Limits
+from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
+from cbrrt_ompl.scenario.scenario import Scenario
 
 BOUNDS = Bounds((0.0, 0.0), (10.0, 10.0))
 EASY = Scenario(

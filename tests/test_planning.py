@@ -18,12 +18,12 @@ import numpy as np
 import pytest
 
 from cbrrt_ompl import plan, verify
+from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import SettingsError, UnknownPlannerError
-from cbrrt_ompl.obstacles import Bounds, Box
 from cbrrt_ompl.planning import PLANNERS, PlanResult
-from cbrrt_ompl.scenario import Scenario
-from cbrrt_ompl.settings import Goal, PlanningSettings, State
-from cbrrt_ompl.world import World
+from cbrrt_ompl.problem.obstacles import Bounds, Box
+from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
+from cbrrt_ompl.scenario.scenario import Scenario
 
 BOUNDS = Bounds((0.0, 0.0), (10.0, 10.0))
 

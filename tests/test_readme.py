@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from cbrrt_ompl.cli import build_parser
-from cbrrt_ompl.scenario import load_scenario
+from cbrrt_ompl.scenario.scenario import load_scenario
 
 
 @pytest.fixture(scope="module")

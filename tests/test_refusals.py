@@ -17,13 +17,13 @@ from cbrrt_ompl.benchmark import case as case_module
 from cbrrt_ompl.benchmark.campaign import Campaign
 from cbrrt_ompl.benchmark.case import check_log, crash_log
 from cbrrt_ompl.benchmark.database import open_database, write_database
+from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import InputError, MapError, RobotError, SettingsError
 from cbrrt_ompl.maps import OccupancyMap, load_map
-from cbrrt_ompl.obstacles import Bounds
-from cbrrt_ompl.robot import Footprint
-from cbrrt_ompl.scenario import Scenario
-from cbrrt_ompl.settings import Goal, State
-from cbrrt_ompl.world import World
+from cbrrt_ompl.problem.obstacles import Bounds
+from cbrrt_ompl.problem.robot import Footprint
+from cbrrt_ompl.problem.settings import Goal, State
+from cbrrt_ompl.scenario.scenario import Scenario
 
 OPEN = Scenario(
     name="open",

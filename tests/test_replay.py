@@ -10,16 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from cbrrt_ompl.clearance_map import ClearanceMap
-from cbrrt_ompl.compiled.search import Search
-from cbrrt_ompl.control_laws import tracking_command
-from cbrrt_ompl.kinematics import dynamic_step, kinematic_step
-from cbrrt_ompl.motion_model import CLOSED_LOOP, OPEN_LOOP, STEERING, pack_model
-from cbrrt_ompl.obstacles import Bounds, Disc
-from cbrrt_ompl.replay import replay_edges, replay_path, trajectory_from_controls, tree_from_controls
-from cbrrt_ompl.robot import Footprint, Gains, Limits, Robot
-from cbrrt_ompl.settings import Goal, PlanningSettings, State
-from cbrrt_ompl.world import World
+from cbrrt_ompl.collision.clearance_map import ClearanceMap
+from cbrrt_ompl.collision.world import World
+from cbrrt_ompl.motion.control_laws import tracking_command
+from cbrrt_ompl.motion.kinematics import dynamic_step, kinematic_step
+from cbrrt_ompl.motion.model import CLOSED_LOOP, OPEN_LOOP, STEERING, pack_model
+from cbrrt_ompl.planners.search import Search
+from cbrrt_ompl.problem.obstacles import Bounds, Disc
+from cbrrt_ompl.problem.robot import Footprint, Gains, Limits, Robot
+from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
+from cbrrt_ompl.trajectory.replay import replay_edges, replay_path, trajectory_from_controls, tree_from_controls
 
 LAWS = {"open loop": OPEN_LOOP, "closed loop": CLOSED_LOOP, "steering": STEERING}
 START = np.array([0.2, -0.3, 0.4, 0.5, -0.1])

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from cbrrt_ompl.compiled.nearest import KINDS
+from cbrrt_ompl.planners.nearest import KINDS
 from cbrrt_ompl.reproduce.charts import readings_figure
 from cbrrt_ompl.reproduce.claims import make_claims
 from cbrrt_ompl.reproduce.measuring import Run
@@ -17,7 +17,7 @@ from cbrrt_ompl.reproduce.report import Material, make_report
 from cbrrt_ompl.reproduce.scenes import CASE_1, CASE_2, OTHERS, READINGS, ROOMS
 from cbrrt_ompl.reproduce.study import COMPILED, NAIVE, NEIGHBOURS, Key
 from cbrrt_ompl.reproduce.verdicts import Verdict
-from cbrrt_ompl.scenario import load_scenario
+from cbrrt_ompl.scenario.scenario import load_scenario
 
 CB, S = COMPILED
 FAST, SLOW = READINGS[0].title, READINGS[1].title

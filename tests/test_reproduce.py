@@ -17,9 +17,11 @@ import pytest
 
 from cbrrt_ompl.benchmark.statistics import Interval
 from cbrrt_ompl.cli import main
+from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import CbrrtError, SettingsError, WorldError
-from cbrrt_ompl.obstacles import Bounds, Box, Disc
 from cbrrt_ompl.planning import plan
+from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc
+from cbrrt_ompl.problem.settings import Goal, State
 from cbrrt_ompl.reproduce import reproduction
 from cbrrt_ompl.reproduce.claims import make_claims
 from cbrrt_ompl.reproduce.grids import CENTRES, WHOLE_CELLS, GridStudy, shortest_path
@@ -31,9 +33,7 @@ from cbrrt_ompl.reproduce.scenes import CASE_1, CASE_2, READINGS, ROOMS, with_ga
 from cbrrt_ompl.reproduce.store import Store, locked
 from cbrrt_ompl.reproduce.study import NAIVE, Key, Part, Series, make_study, parts_of, study_size
 from cbrrt_ompl.reproduce.verdicts import Answer, Claim, Verdict, above, all_of, below, inside, judge, none_of
-from cbrrt_ompl.scenario import Scenario, load_scenario
-from cbrrt_ompl.settings import Goal, State
-from cbrrt_ompl.world import World
+from cbrrt_ompl.scenario.scenario import Scenario, load_scenario
 
 YES, NO, OPEN = Answer.YES, Answer.NO, Answer.OPEN
 

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cbrrt_ompl.errors import InputError, RobotError
-from cbrrt_ompl.robot import Footprint, Gains, Limits, Robot
+from cbrrt_ompl.problem.robot import Footprint, Gains, Limits, Robot
 
 RECTANGLE = [(-0.2, -0.15), (0.2, -0.15), (0.2, 0.15), (-0.2, 0.15)]
 ARROW = [(-0.3, -0.2), (0.3, 0.0), (-0.3, 0.2), (-0.1, 0.0)]

@@ -11,10 +11,10 @@ import pytest
 
 from cbrrt_ompl import ROBOTS, Robot, Scenario, load_scenario, plan, save_scenario, verify
 from cbrrt_ompl.errors import ScenarioError
-from cbrrt_ompl.motion_model import check_step
-from cbrrt_ompl.robot import Footprint, Gains
-from cbrrt_ompl.scenario import scenario_from_dict
-from cbrrt_ompl.settings import PlanningSettings
+from cbrrt_ompl.motion.model import check_step
+from cbrrt_ompl.problem.robot import Footprint, Gains
+from cbrrt_ompl.problem.settings import PlanningSettings
+from cbrrt_ompl.scenario.scenario import scenario_from_dict
 
 BURGER = ROBOTS["turtlebot3_burger"]
 

@@ -23,13 +23,13 @@ from cbrrt_ompl import (
     plan,
     verify,
 )
-from cbrrt_ompl.clearance_map import ClearanceMap
-from cbrrt_ompl.compiled.growth import bearable_failures
-from cbrrt_ompl.compiled.nearest import BRUTE_FORCE, GRID, KD_TREE, Index, insert, nearest
-from cbrrt_ompl.compiled.planner import CompiledPlanner
-from cbrrt_ompl.compiled.search import Search
-from cbrrt_ompl.motion_model import law_of, pack_model
-from cbrrt_ompl.settings import NEAREST_NEIGHBOUR
+from cbrrt_ompl.collision.clearance_map import ClearanceMap
+from cbrrt_ompl.motion.model import law_of, pack_model
+from cbrrt_ompl.ompl_plugin.compiled_planner import CompiledPlanner
+from cbrrt_ompl.planners.growth import bearable_failures
+from cbrrt_ompl.planners.nearest import BRUTE_FORCE, GRID, KD_TREE, Index, insert, nearest
+from cbrrt_ompl.planners.search import Search
+from cbrrt_ompl.problem.settings import NEAREST_NEIGHBOUR
 
 ROBUST = "cb-rrt-robust"
 

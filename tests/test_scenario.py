@@ -16,11 +16,13 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import InputError, Problem, ScenarioError
-from cbrrt_ompl.obstacles import Bounds, Box, Disc, Obstacle, OrientedBox, Polygon
-from cbrrt_ompl.plain_yaml import MAX_DEPTH, MAX_FILE_SIZE, parse_yaml, resolve
-from cbrrt_ompl.robot import Footprint, Gains, Limits, Robot
-from cbrrt_ompl.scenario import (
+from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, Obstacle, OrientedBox, Polygon
+from cbrrt_ompl.problem.robot import Footprint, Gains, Limits, Robot
+from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
+from cbrrt_ompl.scenario.plain_yaml import MAX_DEPTH, MAX_FILE_SIZE, parse_yaml, resolve
+from cbrrt_ompl.scenario.scenario import (
     MapSource,
     Scenario,
     load_scenario,
@@ -28,8 +30,6 @@ from cbrrt_ompl.scenario import (
     scenario_from_dict,
     scenario_to_dict,
 )
-from cbrrt_ompl.settings import Goal, PlanningSettings, State
-from cbrrt_ompl.world import World
 
 EXAMPLE = """\
 name: two-gaps
@@ -729,9 +729,9 @@ def maps_read(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
             raise InputError(Problem("resolution", 0, "a number above 0"), source=str(path))
         return FakeMap()
 
-    module = types.ModuleType("cbrrt_ompl.maps")
+    module = types.ModuleType("cbrrt_ompl.scenario.maps.loading")
     vars(module)["load_map"] = load_map
-    monkeypatch.setitem(sys.modules, "cbrrt_ompl.maps", module)
+    monkeypatch.setitem(sys.modules, "cbrrt_ompl.scenario.maps.loading", module)
     return read
 
 

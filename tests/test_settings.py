@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from cbrrt_ompl.errors import SettingsError
-from cbrrt_ompl.robot import Limits
-from cbrrt_ompl.settings import MAX_STEPS, Goal, PlanningSettings, State
+from cbrrt_ompl.problem.robot import Limits
+from cbrrt_ompl.problem.settings import MAX_STEPS, Goal, PlanningSettings, State
 
 NAN, INF = math.nan, math.inf
 

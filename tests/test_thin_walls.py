@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from kernels import LAWS, roll_out_answered
 
-from cbrrt_ompl.clearance_map import ClearanceMap
-from cbrrt_ompl.motion_check import BLOCKED, FREE
-from cbrrt_ompl.motion_model import CLOSED_LOOP, pack_model
-from cbrrt_ompl.obstacles import Bounds, OrientedBox
+from cbrrt_ompl.collision.clearance_map import ClearanceMap
+from cbrrt_ompl.collision.motion_check import BLOCKED, FREE
+from cbrrt_ompl.collision.world import World
+from cbrrt_ompl.motion.model import CLOSED_LOOP, pack_model
 from cbrrt_ompl.planning import plan
-from cbrrt_ompl.robot import Footprint, Limits, Robot
-from cbrrt_ompl.scenario import Scenario
-from cbrrt_ompl.settings import Goal, PlanningSettings, State
-from cbrrt_ompl.world import World
+from cbrrt_ompl.problem.obstacles import Bounds, OrientedBox
+from cbrrt_ompl.problem.robot import Footprint, Limits, Robot
+from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
+from cbrrt_ompl.scenario.scenario import Scenario
 
 THICKNESS = 1e-6
 SPEED = 1.0

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from cbrrt_ompl.errors import InputError, TrajectoryError
 from cbrrt_ompl.planning import plan
-from cbrrt_ompl.robot import Limits
-from cbrrt_ompl.scenario import load_scenario
-from cbrrt_ompl.trajectory import COLUMNS, Trajectory, displacement, wrapped
-from cbrrt_ompl.tree import Tree
+from cbrrt_ompl.problem.robot import Limits
+from cbrrt_ompl.scenario.scenario import load_scenario
+from cbrrt_ompl.trajectory.trajectory import COLUMNS, Trajectory, displacement, wrapped
+from cbrrt_ompl.trajectory.tree import Tree
 from cbrrt_ompl.verification import verify
 
 SUFFIXES = (".csv", ".npz", ".json")

@@ -9,16 +9,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import SettingsError
-from cbrrt_ompl.obstacles import Bounds, Box, Disc, OrientedBox, Polygon
-from cbrrt_ompl.robot import Footprint, Limits, Robot
-from cbrrt_ompl.scenario import Scenario
-from cbrrt_ompl.settings import Goal, PlanningSettings, State
-from cbrrt_ompl.trajectory import Trajectory
+from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, OrientedBox, Polygon
+from cbrrt_ompl.problem.robot import Footprint, Limits, Robot
+from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
+from cbrrt_ompl.scenario.scenario import Scenario
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.verification import verify
 from cbrrt_ompl.verification.sweep import PROVEN_SHARE, PURSUED_CHECKS
 from cbrrt_ompl.verification.verifying import RESOLUTION
-from cbrrt_ompl.world import World
 
 DT = 0.05
 LIMITS = Limits()

@@ -13,17 +13,17 @@ from numpy.typing import NDArray
 from strategies import LIMITS, SHARES, WHEELED
 
 from cbrrt_ompl import ROBOTS, plan, verify
-from cbrrt_ompl.control_laws import tracking_command
+from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import RobotError, ScenarioError
-from cbrrt_ompl.kinematics import dynamic_step, has_wheel_limits, joint_ramp, ramp, saturate
-from cbrrt_ompl.motion_model import CLOSED_LOOP, OPEN_LOOP, STEERING, advance, pack_model, unpack_model
-from cbrrt_ompl.obstacles import Bounds, Box
-from cbrrt_ompl.robot import Gains, Limits, Robot
-from cbrrt_ompl.roll_out import SCRATCH_SHAPE, integrate_block
-from cbrrt_ompl.scenario import Scenario
-from cbrrt_ompl.settings import Goal, PlanningSettings, State
-from cbrrt_ompl.trajectory import Trajectory
-from cbrrt_ompl.world import World
+from cbrrt_ompl.motion.control_laws import tracking_command
+from cbrrt_ompl.motion.kinematics import dynamic_step, has_wheel_limits, joint_ramp, ramp, saturate
+from cbrrt_ompl.motion.model import CLOSED_LOOP, OPEN_LOOP, STEERING, advance, pack_model, unpack_model
+from cbrrt_ompl.planners.roll_out import SCRATCH_SHAPE, integrate_block
+from cbrrt_ompl.problem.obstacles import Bounds, Box
+from cbrrt_ompl.problem.robot import Gains, Limits, Robot
+from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
+from cbrrt_ompl.scenario.scenario import Scenario
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 
 DT = 0.05
 velocities = st.tuples(st.floats(-6.0, 6.0), st.floats(-6.0, 6.0))

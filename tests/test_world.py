@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import WorldError
-from cbrrt_ompl.obstacles import MAX_COORDINATE, Bounds, Box, Disc, Obstacle, OrientedBox, Polygon
-from cbrrt_ompl.robot import Footprint
-from cbrrt_ompl.world import World
+from cbrrt_ompl.problem.obstacles import MAX_COORDINATE, Bounds, Box, Disc, Obstacle, OrientedBox, Polygon
+from cbrrt_ompl.problem.robot import Footprint
 
 BORDER = 1e-5
 """Nearer than this to contact, FCL and shapely may disagree: FCL's contact tolerance and the corners of discs [m]."""

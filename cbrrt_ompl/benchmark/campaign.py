@@ -19,9 +19,9 @@ from cbrrt_ompl.benchmark.local import run_locally
 from cbrrt_ompl.benchmark.log import Log, format_log, merge_logs, read_log
 from cbrrt_ompl.errors import CbrrtError, InputError, Problem, SettingsError, UnknownPlannerError
 from cbrrt_ompl.files import write_file
-from cbrrt_ompl.motion_model import check_step
+from cbrrt_ompl.motion.model import check_step
 from cbrrt_ompl.planning import PLANNERS
-from cbrrt_ompl.scenario import Scenario, load_scenario, scenario_to_dict
+from cbrrt_ompl.scenario.scenario import Scenario, load_scenario, scenario_to_dict
 
 RUNS_PER_CASE = 10
 """Runs that share a process: what a crash costs, and what the start of a process is spread over."""

@@ -152,7 +152,7 @@ def main() -> None:
     die_with_parent(int(sys.argv[2]))
     case = Case(**json.load(sys.stdin))
     from cbrrt_ompl.benchmark.experiment import Experiment
-    from cbrrt_ompl.scenario import scenario_from_dict
+    from cbrrt_ompl.scenario.scenario import scenario_from_dict
 
     scenario = scenario_from_dict(case.scenario)
     log = Experiment(scenario, {case.planner: case.seeds}, case.experiment).run(case.time_limit)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from cbrrt_ompl.scenario import Scenario
-from cbrrt_ompl.trajectory import Trajectory
+from cbrrt_ompl.scenario.scenario import Scenario
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.verification import verify
 
 TRAJECTORY_COLUMNS = (

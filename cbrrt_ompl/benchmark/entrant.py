@@ -7,18 +7,18 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from cbrrt_ompl.clearance_map import ClearanceMap
-from cbrrt_ompl.compiled.growth import REFUSALS
-from cbrrt_ompl.compiled.planner import CompiledPlanner
-from cbrrt_ompl.compiled.search import COMPILED_PLANNERS
+from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from cbrrt_ompl.ompl_plugin.binding import ob, ou
+from cbrrt_ompl.ompl_plugin.compiled_planner import CompiledPlanner
 from cbrrt_ompl.ompl_plugin.setup import (
     Equipment,
     equip,
     first_solution_objective,
     make_planner,
 )
-from cbrrt_ompl.scenario import Scenario
+from cbrrt_ompl.planners.growth import REFUSALS
+from cbrrt_ompl.planners.search import COMPILED_PLANNERS
+from cbrrt_ompl.scenario.scenario import Scenario
 
 
 class Entrant(ob.Planner):  # type: ignore[misc]  # OMPL has no type information

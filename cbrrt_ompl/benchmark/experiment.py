@@ -14,17 +14,17 @@ import numpy as np
 from cbrrt_ompl.benchmark.columns import search_columns, trajectory_columns
 from cbrrt_ompl.benchmark.entrant import Entrant
 from cbrrt_ompl.benchmark.log import Log, PlannerLog, read_log
-from cbrrt_ompl.clearance_map import ClearanceMap, clearance_map_for
+from cbrrt_ompl.collision.clearance_map import ClearanceMap, clearance_map_for
 from cbrrt_ompl.errors import InputError, Problem, SettingsError, UnknownPlannerError
-from cbrrt_ompl.motion_model import CLOSED_LOOP, law_of
-from cbrrt_ompl.obstacles import Bounds
+from cbrrt_ompl.motion.model import CLOSED_LOOP, law_of
 from cbrrt_ompl.ompl_plugin.binding import ot, ou
 from cbrrt_ompl.ompl_plugin.results import trajectory_from_path
 from cbrrt_ompl.ompl_plugin.run import quiet_ompl
 from cbrrt_ompl.ompl_plugin.setup import make_equipped_setup
 from cbrrt_ompl.planning import PLANNERS, plan
-from cbrrt_ompl.scenario import Scenario
-from cbrrt_ompl.trajectory import Trajectory
+from cbrrt_ompl.problem.obstacles import Bounds
+from cbrrt_ompl.scenario.scenario import Scenario
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 
 MEMORY_LIMIT = 4096.0
 """Memory that a run may take [MB]."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from cbrrt_ompl.errors import Problem
 
 if TYPE_CHECKING:
-    from cbrrt_ompl.trajectory import Trajectory
+    from cbrrt_ompl.trajectory.trajectory import Trajectory
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 """What the parsers of commands are added to."""
@@ -79,7 +79,7 @@ def add_json(parser: argparse.ArgumentParser) -> None:
 
 def load_trajectory(arguments: argparse.Namespace) -> Trajectory:
     """The trajectory file of a command line, kinematic where the file or ``--kinematic`` says so."""
-    from cbrrt_ompl.trajectory import Trajectory
+    from cbrrt_ompl.trajectory.trajectory import Trajectory
 
     trajectory = Trajectory.load(arguments.trajectory)
     return replace(trajectory, kinematic=True) if arguments.kinematic else trajectory

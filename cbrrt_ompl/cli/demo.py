@@ -13,7 +13,7 @@ from cbrrt_ompl.cli.output_files import add_output_folder, check_backend
 from cbrrt_ompl.cli.progress import plan_progress, run_progress
 
 if TYPE_CHECKING:
-    from cbrrt_ompl.demo import DemoRun
+    from cbrrt_ompl.reproduce.demo import DemoRun
 
 COLUMNS = {"scene": 11, "planner": 15, "result": 7, "nodes": 6, "paper": 7, "ms": 6, "paper ms": 8, "s": 4}
 """Columns on a terminal, with their widths; results.md has all of them."""
@@ -31,7 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
     """``cbrrt demo``."""
     check_backend()
     arguments.output.mkdir(parents=True, exist_ok=True)
-    from cbrrt_ompl.demo import REPRODUCTION_RUNS, caveat, run_demo
+    from cbrrt_ompl.reproduce.demo import REPRODUCTION_RUNS, caveat, run_demo
     from cbrrt_ompl.reproduce.reproduction import reproduce
     from cbrrt_ompl.reproduce.study import study_size
 

@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
     check_output_files(arguments, FILES)
     from cbrrt_ompl.drive import DriveSettings, drive
     from cbrrt_ompl.drive.unknown import load_obstacles, unknown_obstacles
-    from cbrrt_ompl.scenario import load_scenario
+    from cbrrt_ompl.scenario.scenario import load_scenario
 
     scenario = load_scenario(arguments.scenario)
     names = ("sensor_range", "cycle", "planner", "max_samples")
@@ -80,12 +80,12 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.trajectory is not None:
         result.trajectory.save(arguments.trajectory)
     if arguments.figure is not None:
-        from cbrrt_ompl.figures import draw_drive
+        from cbrrt_ompl.figures.figures import draw_drive
         from cbrrt_ompl.files import save_figure
 
         save_figure(draw_drive(result), arguments.figure)
     if arguments.animation is not None:
-        from cbrrt_ompl.animation import animate_drive, save_animation
+        from cbrrt_ompl.figures.animation import animate_drive, save_animation
 
         save_animation(animate_drive(result), arguments.animation)
     data = {"scenario": scenario.name, "seed": arguments.seed, **_data(result)}

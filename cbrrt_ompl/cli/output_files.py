@@ -66,7 +66,7 @@ def check_output_files(arguments: argparse.Namespace, names: Iterable[str]) -> N
     if "figure" in files or "animation" in files:
         check_backend()
     if "animation" in files:
-        from cbrrt_ompl.animation import check_animation_file
+        from cbrrt_ompl.figures.animation import check_animation_file
 
         check_animation_file(files["animation"])
 

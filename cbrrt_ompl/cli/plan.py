@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
     """``cbrrt plan``."""
     check_output_files(arguments, FILES)
     from cbrrt_ompl.planning import plan
-    from cbrrt_ompl.scenario import load_scenario
+    from cbrrt_ompl.scenario.scenario import load_scenario
 
     scenario = load_scenario(arguments.scenario)
     warm_up(arguments.planner)
@@ -56,12 +56,12 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.trajectory is not None and trajectory is not None:
         trajectory.save(arguments.trajectory)
     if arguments.figure is not None:
-        from cbrrt_ompl.figures import draw_plan
+        from cbrrt_ompl.figures.figures import draw_plan
         from cbrrt_ompl.files import save_figure
 
         save_figure(draw_plan(result, scenario), arguments.figure)
     if arguments.animation is not None and trajectory is not None:
-        from cbrrt_ompl.animation import animate, save_animation
+        from cbrrt_ompl.figures.animation import animate, save_animation
 
         save_animation(animate(trajectory, scenario, result.tree), arguments.animation)
     data = {"scenario": scenario.name, **_data(result)}

@@ -11,8 +11,7 @@ from typing import Any
 
 def warm_up(planner: str) -> None:
     """Load the kernels of a planner, and say so on a terminal where they must be compiled first."""
-    from cbrrt_ompl import warm_up as kernels
-    from cbrrt_ompl.compiled.search import COMPILED_PLANNERS
+    from cbrrt_ompl import planning
 
     message = "cbrrt: compiling the planners, once after installation ..."
     timer = threading.Timer(1.0, print, [message], {"file": sys.stderr, "flush": True})
@@ -20,7 +19,7 @@ def warm_up(planner: str) -> None:
     if sys.stderr.isatty():
         timer.start()
     try:
-        kernels.warm_up(needs_ompl=planner not in COMPILED_PLANNERS)
+        planning.warm_up_planner(planner)
     finally:
         timer.cancel()
 

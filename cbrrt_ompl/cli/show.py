@@ -31,9 +31,9 @@ def run(arguments: argparse.Namespace) -> int:
     check_backend()
     from matplotlib.figure import Figure
 
-    from cbrrt_ompl.figures import draw_scene, draw_trajectory
+    from cbrrt_ompl.figures.figures import draw_scene, draw_trajectory
     from cbrrt_ompl.files import save_figure
-    from cbrrt_ompl.scenario import load_scenario
+    from cbrrt_ompl.scenario.scenario import load_scenario
 
     scenario = load_scenario(arguments.scenario)
     trajectory = None if arguments.trajectory is None else load_trajectory(arguments)

@@ -23,7 +23,7 @@ def add_parser(commands: Commands) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """``cbrrt verify``."""
-    from cbrrt_ompl.scenario import load_scenario
+    from cbrrt_ompl.scenario.scenario import load_scenario
     from cbrrt_ompl.verification import verify
 
     trajectory = load_trajectory(arguments)

@@ -8,10 +8,10 @@ from itertools import compress
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.clearance_map import ClearanceMap, clearance_map_for, extend_map
-from cbrrt_ompl.obstacles import Obstacle, bounding_box, distance_from_box, signed_distance
-from cbrrt_ompl.robot import Footprint
-from cbrrt_ompl.world import World
+from cbrrt_ompl.collision.clearance_map import ClearanceMap, clearance_map_for, extend_map
+from cbrrt_ompl.collision.world import World
+from cbrrt_ompl.problem.obstacles import Obstacle, bounding_box, distance_from_box, signed_distance
+from cbrrt_ompl.problem.robot import Footprint
 
 
 class Knowledge:

@@ -8,13 +8,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.drive.settings import DriveSettings
-from cbrrt_ompl.obstacles import Obstacle
-from cbrrt_ompl.scenario import Scenario
-from cbrrt_ompl.settings import Goal, State
-from cbrrt_ompl.trajectory import Trajectory
+from cbrrt_ompl.problem.obstacles import Obstacle
+from cbrrt_ompl.problem.settings import Goal, State
+from cbrrt_ompl.scenario.scenario import Scenario
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.verification import Verification, verify
-from cbrrt_ompl.world import World
 
 REACHED, STOPPED = "reached", "stopped"
 """How a drive ends."""

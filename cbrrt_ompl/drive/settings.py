@@ -9,11 +9,11 @@ import numpy as np
 import shapely
 
 from cbrrt_ompl.errors import Problem, SettingsError
-from cbrrt_ompl.kinematics import brake
-from cbrrt_ompl.motion_model import STEERING, law_of
+from cbrrt_ompl.motion.kinematics import brake
+from cbrrt_ompl.motion.model import STEERING, law_of
 from cbrrt_ompl.planning import PLANNERS
-from cbrrt_ompl.robot import Footprint, Robot
-from cbrrt_ompl.settings import MAX_STEPS, PlanningSettings
+from cbrrt_ompl.problem.robot import Footprint, Robot
+from cbrrt_ompl.problem.settings import MAX_STEPS, PlanningSettings
 
 STEP_TOLERANCE = 1e-6
 """Share of a planning step by which the cycle may differ from whole steps."""

@@ -17,20 +17,18 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.clearance_map import clearance_map_for
-from cbrrt_ompl.compiled.search import COMPILED_PLANNERS
+from cbrrt_ompl.collision.clearance_map import clearance_map_for
+from cbrrt_ompl.collision.motion_check import is_free
+from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.drive.knowledge import Knowledge
 from cbrrt_ompl.drive.result import LATE, NO_ROOM, REACHED, STOPPED, UNSAFE, Cycle, DriveResult, Replan
 from cbrrt_ompl.drive.settings import DriveSettings, grown, needed_range
 from cbrrt_ompl.errors import Problem, ScenarioError, SettingsError
-from cbrrt_ompl.motion_check import is_free
-from cbrrt_ompl.obstacles import Obstacle
-from cbrrt_ompl.planning import plan
-from cbrrt_ompl.scenario import Scenario
-from cbrrt_ompl.settings import State
-from cbrrt_ompl.trajectory import Trajectory
-from cbrrt_ompl.warm_up import warm_up
-from cbrrt_ompl.world import World
+from cbrrt_ompl.planning import plan, warm_up_planner
+from cbrrt_ompl.problem.obstacles import Obstacle
+from cbrrt_ompl.problem.settings import State
+from cbrrt_ompl.scenario.scenario import Scenario
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 
 SEARCH_SHARE = 0.9
 """Share of the time that is left in which the search has to end; the rest is for checking what it found."""
@@ -88,7 +86,7 @@ class Drive:
         self._failures = 0
         self.status = None if scenario.goal.violations(scenario.start) else REACHED
         self.cycles: list[Cycle] = []
-        warm_up(needs_ompl=self.settings.planner not in COMPILED_PLANNERS)
+        warm_up_planner(self.settings.planner)
         if not is_free(self._committed.states, self._dt, clearance_map_for(self.world, self._robot.footprint)):
             expected = f"a state with {self.settings.margin:g} m of room (the margin), on the way to rest as well"
             raise ScenarioError(Problem("start", list(scenario.start), expected))

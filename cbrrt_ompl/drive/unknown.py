@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from cbrrt_ompl.errors import InputError, Problem, ScenarioError
-from cbrrt_ompl.obstacles import Bounds, Disc, Obstacle, OrientedBox, signed_distance
-from cbrrt_ompl.plain_yaml import read_yaml
-from cbrrt_ompl.scenario import Scenario
-from cbrrt_ompl.scenario_file import obstacle
-from cbrrt_ompl.sections import Key, Report, list_of, read_partial
+from cbrrt_ompl.problem.obstacles import Bounds, Disc, Obstacle, OrientedBox, signed_distance
+from cbrrt_ompl.scenario.plain_yaml import read_yaml
+from cbrrt_ompl.scenario.scenario import Scenario
+from cbrrt_ompl.scenario.scenario_file import obstacle
+from cbrrt_ompl.scenario.sections import Key, Report, list_of, read_partial
 
 SIZES = (0.02, 0.06)
 """Smallest and largest radius of a random obstacle, as a share of the longer side of the bounds."""

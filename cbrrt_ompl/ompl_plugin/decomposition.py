@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from cbrrt_ompl.collision.world import Bounds
 from cbrrt_ompl.ompl_plugin.binding import ob, oc
-from cbrrt_ompl.world import Bounds
 
 CELLS_PER_SIDE = 32
 """Cells of the grid along each axis, as in OMPL's own Syclop demo."""

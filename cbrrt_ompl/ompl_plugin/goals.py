@@ -8,7 +8,7 @@ from typing import Any
 from cbrrt_ompl.ompl_plugin.binding import ob
 from cbrrt_ompl.ompl_plugin.reals import StateReals
 from cbrrt_ompl.ompl_plugin.space import STATE_DIMENSION, set_state
-from cbrrt_ompl.settings import Goal, State
+from cbrrt_ompl.problem.settings import Goal, State
 
 _JUST_BELOW_ONE = math.nextafter(1.0, 0.0)
 

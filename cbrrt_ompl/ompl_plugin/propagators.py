@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cbrrt_ompl.motion_model import advance, control_dimension, unpack_model
+from cbrrt_ompl.motion.model import advance, control_dimension, unpack_model
 from cbrrt_ompl.ompl_plugin.binding import oc
 from cbrrt_ompl.ompl_plugin.reals import StateReals
 from cbrrt_ompl.ompl_plugin.space import STATE_DIMENSION
@@ -31,7 +31,7 @@ class TwoWheelPropagator(oc.StatePropagator):  # type: ignore[misc]  # OMPL has 
         Args:
             si: the space information that will own this propagator.
             space: its state space.
-            model: packed model, see :func:`cbrrt_ompl.motion_model.pack_model`.
+            model: packed model, see :func:`cbrrt_ompl.motion.model.pack_model`.
         """
         super().__init__(si)
         self._reals = StateReals(space, STATE_DIMENSION)
@@ -54,7 +54,7 @@ class TwoWheelPropagator(oc.StatePropagator):  # type: ignore[misc]  # OMPL has 
 def advance_packed(
     values: NDArray[np.float64], c0: float, c1: float, c2: float, model: NDArray[np.float64], dt: float
 ) -> None:
-    """:func:`cbrrt_ompl.motion_model.advance` in place, for a caller in Python; values of shape (5,)."""
+    """:func:`cbrrt_ompl.motion.model.advance` in place, for a caller in Python; values of shape (5,)."""
     m = unpack_model(model)
     x, y, theta, v, omega, _, _ = advance(values[0], values[1], values[2], values[3], values[4], (c0, c1, c2), m, dt)
     values[0], values[1], values[2], values[3], values[4] = x, y, theta, v, omega

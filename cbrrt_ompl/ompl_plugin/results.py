@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.motion_model import control_dimension
+from cbrrt_ompl.motion.model import control_dimension
 from cbrrt_ompl.ompl_plugin.binding import oc, ou
-from cbrrt_ompl.replay import trajectory_from_controls, tree_from_controls
-from cbrrt_ompl.trajectory import Trajectory
-from cbrrt_ompl.tree import Tree
+from cbrrt_ompl.trajectory.replay import trajectory_from_controls, tree_from_controls
+from cbrrt_ompl.trajectory.trajectory import Trajectory
+from cbrrt_ompl.trajectory.tree import Tree
 
 
 def trajectory_from_path(path: Any, space: Any, model: NDArray[np.float64]) -> Trajectory:

@@ -9,13 +9,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
-from cbrrt_ompl.clearance_map import ClearanceMap, clearance_map_for
+from cbrrt_ompl.collision.clearance_map import ClearanceMap, clearance_map_for
 from cbrrt_ompl.ompl_plugin.binding import ob, ou
 from cbrrt_ompl.ompl_plugin.results import trajectory_from_path, tree_from_planner
 from cbrrt_ompl.ompl_plugin.setup import Equipment, make_equipped_setup
-from cbrrt_ompl.scenario import Scenario
-from cbrrt_ompl.trajectory import Trajectory
-from cbrrt_ompl.tree import Tree
+from cbrrt_ompl.scenario.scenario import Scenario
+from cbrrt_ompl.trajectory.trajectory import Trajectory
+from cbrrt_ompl.trajectory.tree import Tree
 
 _ompl = threading.RLock()
 """Held by the plan that OMPL is busy with: its seed and its log level are those of the process."""

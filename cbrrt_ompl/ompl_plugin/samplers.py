@@ -9,14 +9,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cbrrt_ompl.clearance_map import ClearanceMap, unpack_view
-from cbrrt_ompl.extension import EXTENDED, NO_CHILD, REFUSED, UNTRIED, extend
-from cbrrt_ompl.motion_check import ASK
-from cbrrt_ompl.motion_model import control_dimension, unpack_model
+from cbrrt_ompl.collision.clearance_map import ClearanceMap, unpack_view
+from cbrrt_ompl.collision.motion_check import ASK
+from cbrrt_ompl.motion.model import control_dimension, unpack_model
 from cbrrt_ompl.ompl_plugin.binding import oc
 from cbrrt_ompl.ompl_plugin.reals import StateReals
 from cbrrt_ompl.ompl_plugin.space import STATE_DIMENSION
-from cbrrt_ompl.roll_out import SCRATCH_SHAPE
+from cbrrt_ompl.planners.extension import EXTENDED, NO_CHILD, REFUSED, UNTRIED, extend
+from cbrrt_ompl.planners.roll_out import SCRATCH_SHAPE
 
 
 class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL has no type information
@@ -40,7 +40,7 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         Args:
             si: the space information that allocates this sampler.
             space: its state space. (References to ``si`` itself would make a cycle that Python cannot see.)
-            model: packed model, see :func:`cbrrt_ompl.motion_model.pack_model`.
+            model: packed model, see :func:`cbrrt_ompl.motion.model.pack_model`.
             clearance_map: decides the states.
         """
         super().__init__(si)
@@ -147,7 +147,7 @@ def extend_packed(
     outcome: NDArray[np.float64],
     scratch: NDArray[np.float64],
 ) -> int:
-    """:func:`cbrrt_ompl.extension.extend` for a caller in Python: flat arrays in, outcome and last state out."""
+    """:func:`extend` for a caller in Python: flat arrays in, outcome and last state out."""
     extension = extend(
         (node[0], node[1], node[2], node[3], node[4]),
         sample[0],

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.clearance_map import ClearanceMap
-from cbrrt_ompl.compiled.search import COMPILED_PLANNERS
+from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from cbrrt_ompl.errors import UnknownPlannerError
-from cbrrt_ompl.motion_model import CLOSED_LOOP, check_step, law_of, pack_model
+from cbrrt_ompl.motion.model import CLOSED_LOOP, check_step, law_of, pack_model
 from cbrrt_ompl.ompl_plugin.binding import ob, oc
 from cbrrt_ompl.ompl_plugin.decomposition import PositionDecomposition
 from cbrrt_ompl.ompl_plugin.goals import make_goal
@@ -24,7 +23,8 @@ from cbrrt_ompl.ompl_plugin.samplers import (
 )
 from cbrrt_ompl.ompl_plugin.space import make_control_space, make_reference_space, make_state_space, set_state
 from cbrrt_ompl.ompl_plugin.validity import FclStateValidityChecker
-from cbrrt_ompl.scenario import Scenario, check_scenario
+from cbrrt_ompl.planners.search import COMPILED_PLANNERS
+from cbrrt_ompl.scenario.scenario import Scenario, check_scenario
 
 SAMPLERS: dict[str, type[ExtensionSampler]] = {
     "cb-rrt": KanayamaDirectedControlSampler,
@@ -61,7 +61,7 @@ class Equipment:
     """What one planner was given: its model, its map and, once it has begun, its sampler.
 
     Attributes:
-        model: packed model, see :func:`cbrrt_ompl.motion_model.pack_model`.
+        model: packed model, see :func:`cbrrt_ompl.motion.model.pack_model`.
         clearance_map: decides its states.
         sampler: the sampler allocated last; None for OMPL's own planners.
         should_stop: see :class:`ExtensionSampler`; given to the samplers allocated from now on.
@@ -167,7 +167,7 @@ def make_planner(si: Any, scenario: Scenario, planner: str, clearance_map: Clear
         clearance_map: decides the states of the compiled planners.
     """
     if planner in COMPILED_PLANNERS:
-        from cbrrt_ompl.compiled.planner import CompiledPlanner  # here, since it builds on this package
+        from cbrrt_ompl.ompl_plugin.compiled_planner import CompiledPlanner  # here, since it builds on this package
 
         return CompiledPlanner(si, scenario, planner, clearance_map)
     if planner in SAMPLERS:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from cbrrt_ompl.kinematics import wrap_angle
+from cbrrt_ompl.collision.world import Bounds
+from cbrrt_ompl.motion.kinematics import wrap_angle
 from cbrrt_ompl.ompl_plugin.binding import ob, oc
-from cbrrt_ompl.robot import Limits
-from cbrrt_ompl.settings import State
-from cbrrt_ompl.world import Bounds
+from cbrrt_ompl.problem.robot import Limits
+from cbrrt_ompl.problem.settings import State
 
 STATE_DIMENSION = 5
 """Reals of a state: x, y, theta, v, omega."""
@@ -49,7 +49,7 @@ def make_control_space(space: Any, limits: Limits, has_manoeuvres: bool = False)
         space: the state space.
         limits: ranges of v and omega.
         has_manoeuvres: whether a third number, from 0 to 1 and without meaning, makes room for the marks of
-            :mod:`cbrrt_ompl.manoeuvres`, which are outside of that range.
+            :mod:`cbrrt_ompl.motion.manoeuvres`, which are outside of that range.
     """
     low: tuple[float, ...] = (limits.v_min, limits.omega_min)
     high: tuple[float, ...] = (limits.v_max, limits.omega_max)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from cbrrt_ompl.clearance_map import ClearanceMap
+from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from cbrrt_ompl.ompl_plugin.binding import ob
 from cbrrt_ompl.ompl_plugin.reals import StateReals
 from cbrrt_ompl.ompl_plugin.space import STATE_DIMENSION

@@ -15,7 +15,7 @@ from matplotlib.legend_handler import HandlerPolyCollection
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from cbrrt_ompl.benchmark.charts import COLORS
-from cbrrt_ompl.figures import draw_scene, draw_trajectory, draw_tree, draw_velocities
+from cbrrt_ompl.figures.figures import draw_scene, draw_trajectory, draw_tree, draw_velocities
 from cbrrt_ompl.planning import PlanResult, plan
 from cbrrt_ompl.reproduce.claims import QueryCosts
 from cbrrt_ompl.reproduce.grids import GridPath
@@ -24,7 +24,7 @@ from cbrrt_ompl.reproduce.outcomes import Outcomes, Sample
 from cbrrt_ompl.reproduce.published import PAPER
 from cbrrt_ompl.reproduce.scenes import CASE_1, CASE_2, shift_title, title_of
 from cbrrt_ompl.reproduce.study import COMPILED
-from cbrrt_ompl.scenario import Scenario
+from cbrrt_ompl.scenario.scenario import Scenario
 
 NAMES = {"cb-rrt": "CB-RRT", "s-rrt": "S-RRT"}
 MARKERS = {"cb-rrt": "o", "s-rrt": "s", "grid": "o", "kd-tree": "^", "brute-force": "s"}

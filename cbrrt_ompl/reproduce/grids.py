@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from cbrrt_ompl.robot import Limits
-from cbrrt_ompl.scenario import Scenario
+from cbrrt_ompl.problem.robot import Limits
+from cbrrt_ompl.scenario.scenario import Scenario
 
 CELLS = (0.1, 0.2)
 """Sides of the cells that the paper names [m]."""

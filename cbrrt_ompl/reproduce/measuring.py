@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from cbrrt_ompl.benchmark.experiment import survey
-from cbrrt_ompl.clearance_map import clearance_map_for
+from cbrrt_ompl.collision.clearance_map import clearance_map_for
 from cbrrt_ompl.ompl_plugin.run import Found, run
 from cbrrt_ompl.planning import plan
+from cbrrt_ompl.problem.robot import Limits
 from cbrrt_ompl.reproduce.study import NAIVE, Part
-from cbrrt_ompl.robot import Limits
-from cbrrt_ompl.scenario import Scenario, scenario_from_dict
-from cbrrt_ompl.trajectory import Trajectory
+from cbrrt_ompl.scenario.scenario import Scenario, scenario_from_dict
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.verification import verify
 
 TIME_LIMIT = 300.0

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cbrrt_ompl.compiled.nearest import BRUTE_FORCE, GRID, KD_TREE, KINDS, Index, insert, nearest
+from cbrrt_ompl.planners.nearest import BRUTE_FORCE, GRID, KD_TREE, KINDS, Index, insert, nearest
 
 SIDE = 10.0
 """Side of the world, a square [m]."""

@@ -29,7 +29,7 @@ from cbrrt_ompl.reproduce.published import PAPER, PROCESSOR, SPEED_RATIO, TREE_S
 from cbrrt_ompl.reproduce.scenes import CASE_1, CASE_2, OTHERS, READINGS, ROOMS, SHIFTS, shift_title, title_of
 from cbrrt_ompl.reproduce.study import COMPILED, IN_OMPL, NAIVE, NEIGHBOURS
 from cbrrt_ompl.reproduce.verdicts import MEANINGS, Claim
-from cbrrt_ompl.scenario import Scenario
+from cbrrt_ompl.scenario.scenario import Scenario
 
 
 @dataclass(frozen=True, eq=False)

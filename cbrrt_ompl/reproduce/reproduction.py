@@ -9,9 +9,9 @@ from datetime import datetime
 from pathlib import Path
 
 from cbrrt_ompl.benchmark.local import available_cores
-from cbrrt_ompl.compiled.nearest import KINDS
 from cbrrt_ompl.errors import Problem, SettingsError
 from cbrrt_ompl.files import write_file, write_files
+from cbrrt_ompl.planners.nearest import KINDS
 from cbrrt_ompl.reproduce.grids import CELLS, PLACES, RULES, GridStudy, study_grids
 from cbrrt_ompl.reproduce.machine import machine, versions
 from cbrrt_ompl.reproduce.neighbours import query_costs
@@ -23,7 +23,7 @@ from cbrrt_ompl.reproduce.scenes import CASE_1, CASE_2
 from cbrrt_ompl.reproduce.store import Store, locked
 from cbrrt_ompl.reproduce.study import Part, Series, make_study, parts_of
 from cbrrt_ompl.reproduce.verdicts import Claim
-from cbrrt_ompl.scenario import Scenario
+from cbrrt_ompl.scenario.scenario import Scenario
 
 RUNS_FILE = "runs.jsonl"
 PICTURES = "figures"

@@ -7,10 +7,10 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import Problem, WorldError
-from cbrrt_ompl.obstacles import Box
-from cbrrt_ompl.scenario import Scenario
-from cbrrt_ompl.world import World
+from cbrrt_ompl.problem.obstacles import Box
+from cbrrt_ompl.scenario.scenario import Scenario
 
 CASE_1, CASE_2, ROOMS = "paper_case1", "paper_case2", "paper_case2_rooms"
 

@@ -22,7 +22,7 @@ from cbrrt_ompl.reproduce.scenes import (
     with_gaps_moved,
     with_settings,
 )
-from cbrrt_ompl.scenario import Scenario, load_scenario, scenario_to_dict
+from cbrrt_ompl.scenario.scenario import Scenario, load_scenario, scenario_to_dict
 
 NAIVE = "rrt-5d"
 """OMPL's control::RRT with a metric over all five components of the state; in this study alone."""

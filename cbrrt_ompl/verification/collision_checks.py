@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
-from cbrrt_ompl.trajectory import Trajectory
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.verification.motion import LONGEST_TURN, LONGEST_WAY, Motion
 from cbrrt_ompl.verification.sweep import Sweep
 from cbrrt_ompl.verification.violation import Violation, place

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from cbrrt_ompl.trajectory import Trajectory
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.verification.motion import is_checkable
 
 RELATIVE_ERROR, ABSOLUTE_ERROR = 1e-10, 1e-12

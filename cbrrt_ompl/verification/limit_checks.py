@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cbrrt_ompl.trajectory import Trajectory
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.verification.velocities import wheel_speeds
 from cbrrt_ompl.verification.violation import UNITS, Violation, broken_condition
 
 if TYPE_CHECKING:
-    from cbrrt_ompl.robot import Limits
+    from cbrrt_ompl.problem.robot import Limits
 
 _SLACK = 1e-9
 """Relative excess over a limit that is rounding."""

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.settings import State
-from cbrrt_ompl.trajectory import Trajectory, wrapped
+from cbrrt_ompl.problem.settings import State
+from cbrrt_ompl.trajectory.trajectory import Trajectory, wrapped
 from cbrrt_ompl.verification.violation import UNITS, Violation, broken_condition
 
 if TYPE_CHECKING:
-    from cbrrt_ompl.scenario import Scenario
+    from cbrrt_ompl.scenario.scenario import Scenario
 
 START_TOLERANCE = 1e-6
 """Largest deviation of the first row from the scenario's start, in each value [m, rad, m/s, rad/s]."""

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.trajectory import wrapped
+from cbrrt_ompl.trajectory.trajectory import wrapped
 from cbrrt_ompl.verification.motion import Motion
 
 if TYPE_CHECKING:
-    from cbrrt_ompl.world import CollisionChecker
+    from cbrrt_ompl.collision.world import CollisionChecker
 
 PROVEN_SHARE = 0.95
 """The bound on the clearance is pursued until it is this share of the smallest clearance found."""

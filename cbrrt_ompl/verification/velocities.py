@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cbrrt_ompl.trajectory import Trajectory
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from cbrrt_ompl.robot import Limits
+    from cbrrt_ompl.problem.robot import Limits
 
 
 def velocities_again(trajectory: Trajectory, limits: Limits) -> NDArray[np.float64]:

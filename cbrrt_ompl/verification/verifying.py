@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.errors import Problem, SettingsError, TrajectoryError
-from cbrrt_ompl.sections import is_number
-from cbrrt_ompl.trajectory import Trajectory
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.verification.collision_checks import collision_violations, sampling_violations
 from cbrrt_ompl.verification.integration import integrate_again
 from cbrrt_ompl.verification.limit_checks import (
@@ -24,7 +24,7 @@ from cbrrt_ompl.verification.sweep import sweep
 from cbrrt_ompl.verification.velocities import velocities_again
 
 if TYPE_CHECKING:
-    from cbrrt_ompl.scenario import Scenario
+    from cbrrt_ompl.scenario.scenario import Scenario
 
 RESOLUTION = 1e-4
 """Intervals in which no point of the footprint moves more than this need no proof: their ends are to be free [m]."""
@@ -64,7 +64,7 @@ def verify(
         TrajectoryError: if this is no trajectory.
         SettingsError: if the tolerance or the resolution is no number above 0.
     """
-    from cbrrt_ompl.scenario import check_scenario
+    from cbrrt_ompl.scenario.scenario import check_scenario
 
     check_scenario(scenario)
     if not isinstance(trajectory, Trajectory):

@@ -1,0 +1,29 @@
+"""Figures and animations; each function draws on the axes given to it, none shows or saves."""
+
+from __future__ import annotations
+
+from cbrrt_ompl.figures.figures import (
+    draw_computing_times,
+    draw_drive,
+    draw_extension,
+    draw_plan,
+    draw_scene,
+    draw_trajectory,
+    draw_tree,
+    draw_unknown,
+    draw_velocities,
+    draw_world,
+)
+
+__all__ = [
+    "draw_computing_times",
+    "draw_drive",
+    "draw_extension",
+    "draw_plan",
+    "draw_scene",
+    "draw_trajectory",
+    "draw_tree",
+    "draw_unknown",
+    "draw_velocities",
+    "draw_world",
+]

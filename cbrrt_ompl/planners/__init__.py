@@ -1,0 +1,1 @@
+"""CB-RRT and S-RRT, compiled: extension, nearest neighbour and the growth of the tree."""

@@ -1,0 +1,203 @@
+"""What to plan for and how: the goal region and the settings of Algorithms I and II."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from numbers import Integral
+from typing import NamedTuple
+
+import numpy as np
+
+from cbrrt_ompl.checks import A_NUMBER, A_POSITIVE_NUMBER, LARGEST, SMALLEST, is_number
+from cbrrt_ompl.errors import Problem, SettingsError
+from cbrrt_ompl.problem.robot import Limits
+
+CUT_EXTENSION = ("discard", "keep")
+"""What may become of an extension that meets an obstacle before its horizon."""
+
+NEAREST_NEIGHBOUR = ("grid", "kd-tree", "brute-force")
+"""Ways in which the compiled planners find the node nearest to a sample."""
+
+
+class State(NamedTuple):
+    """A state of SE(2) x R^2, of start poses and of trajectories alike."""
+
+    x: float
+    """Position [m]."""
+    y: float
+    """Position [m]."""
+    theta: float = 0.0
+    """Heading, counter-clockwise from the x axis [rad]."""
+    v: float = 0.0
+    """Forward velocity [m/s]."""
+    omega: float = 0.0
+    """Turning rate [rad/s]."""
+
+
+@dataclass(frozen=True)
+class Goal:
+    """The goal region: a disc in (x, y), with the heading and the speed restricted on request.
+
+    A state is in it where its distance to (x, y) is below ``tolerance`` (as in OMPL, strictly), the heading is at
+    most ``heading_tolerance`` away from ``theta``, and neither speed, of v [m/s] or omega [rad/s], is above
+    ``speed_tolerance``.
+
+    Raises:
+        SettingsError: with every value that makes no sense.
+    """
+
+    x: float
+    """Centre [m]."""
+    y: float
+    """Centre [m]."""
+    tolerance: float = 0.5
+    """Radius of the disc [m]."""
+    theta: float | None = None
+    """Heading to arrive in [rad]; None leaves it free."""
+    heading_tolerance: float = math.radians(10.0)
+    """Largest deviation from ``theta`` [rad]; without meaning where ``theta`` is None."""
+    speed_tolerance: float | None = None
+    """Largest speed to arrive with, of v [m/s] and of omega [rad/s]; None leaves them free."""
+
+    def __post_init__(self) -> None:
+        """Check all values together."""
+        optional = [name for name in ("theta", "speed_tolerance") if getattr(self, name) is None]
+        problems = [
+            Problem(f"goal.{name}", getattr(self, name), A_NUMBER)
+            for name in ("x", "y", "theta")
+            if name not in optional and not is_number(getattr(self, name), LARGEST)
+        ]
+        for name in ("tolerance", "heading_tolerance", "speed_tolerance"):
+            value = getattr(self, name)
+            if name not in optional and not (is_number(value, LARGEST) and value > 0.0):
+                problems.append(Problem(f"goal.{name}", value, f"a number above 0, at most {LARGEST:g}"))
+        if problems:
+            raise SettingsError(problems)
+        _keep_floats(self, "x", "y", "tolerance", "theta", "heading_tolerance", "speed_tolerance")
+
+    @property
+    def is_position_only(self) -> bool:
+        """Whether heading and speed are both free, as in the paper."""
+        return self.theta is None and self.speed_tolerance is None
+
+    def violations(self, state: State) -> list[str]:
+        """What keeps a state out of the goal region; empty where the state is inside.
+
+        Args:
+            state: the state to judge.
+
+        Returns:
+            A line a violated condition, with the figure and the tolerance.
+        """
+        found = []
+        dx, dy = state.x - self.x, state.y - self.y
+        distance = math.sqrt(dx * dx + dy * dy)  # as OMPL computes it, to the last bit
+        if not distance < self.tolerance:
+            found.append(f"{distance:.6g} m from the goal, tolerance {self.tolerance:g} m")
+        if self.theta is not None:
+            error = abs(math.remainder(state.theta - self.theta, math.tau))
+            if error > self.heading_tolerance:
+                found.append(f"heading off by {error:.6g} rad, tolerance {self.heading_tolerance:g} rad")
+        if self.speed_tolerance is not None:
+            for name, speed, unit in (("v", state.v, "m/s"), ("omega", state.omega, "rad/s")):
+                if abs(speed) > self.speed_tolerance:
+                    found.append(f"arrives with {name} = {speed:.6g} {unit}, tolerance {self.speed_tolerance:g}")
+        return found
+
+
+@dataclass(frozen=True)
+class PlanningSettings:
+    """Settings of both planners; the defaults are our readings of the paper.
+
+    Raises:
+        SettingsError: with every value that makes no sense.
+    """
+
+    horizon: float = 2.0
+    """Duration t_h of one extension [s]."""
+    step: float = 0.05
+    """Integration step dt, and the spacing of the checked states [s]."""
+    goal_bias: float = 0.0
+    """Share of samples that are the goal itself, 0 to 1."""
+    max_samples: int = 50_000
+    """Samples after which a plan has failed: K of Algorithm I."""
+    cut_extension: str = "discard"
+    """``discard`` or ``keep`` the free part of an extension that meets an obstacle."""
+    equal_control_tolerance: float = 0.1
+    """eps_u of Algorithm II, line 5 [m/s and rad/s]; 0 refuses only an identical control, a negative one nothing."""
+    look_ahead: float | None = None
+    """Largest distance of the reference from its node [m]; None is ``v_max * horizon``."""
+    closed_loop: bool = False
+    """Evaluate the Kanayama law at every step instead of once an extension."""
+    final_approach: bool = True
+    """Try from every node to brake, turn, drive straight onto the goal's centre and turn to its heading, at rest; only
+    for goals that restrict heading or speed."""
+    brake_safe: bool = False
+    """Keep only what the robot can brake from to rest without collision, from every step on (CB-RRT; the velocities of
+    S-RRT jump, so that it always can)."""
+    nearest_neighbour: str = "grid"
+    """How the compiled planners find the nearest node: ``grid``, ``kd-tree`` or ``brute-force``."""
+
+    def __post_init__(self) -> None:
+        """Check all values together."""
+        problems = [
+            Problem(f"planning.{name}", getattr(self, name), f"{A_POSITIVE_NUMBER} [s]")
+            for name in ("horizon", "step")
+            if not _is_positive(getattr(self, name))
+        ]
+        if not problems and not 0.5 < float(self.horizon) / float(self.step) <= MAX_STEPS + 0.5:
+            problems.append(
+                Problem("planning.horizon", self.horizon, f"1 to {MAX_STEPS} steps of {self.step:g} s (planning.step)")
+            )
+        if not (is_number(self.goal_bias) and 0.0 <= self.goal_bias <= 1.0):
+            problems.append(Problem("planning.goal_bias", self.goal_bias, "a number from 0 to 1"))
+        if not (is_number(self.max_samples) and isinstance(self.max_samples, Integral)) or not (
+            1 <= self.max_samples <= MAX_SAMPLES
+        ):
+            expected = f"a whole number of 1 or more, at most {MAX_SAMPLES}"
+            problems.append(Problem("planning.max_samples", self.max_samples, expected))
+        for name, known in (("cut_extension", CUT_EXTENSION), ("nearest_neighbour", NEAREST_NEIGHBOUR)):
+            if not (isinstance(getattr(self, name), str) and getattr(self, name) in known):
+                problems.append(Problem(f"planning.{name}", getattr(self, name), f"one of {', '.join(known)}"))
+        if not is_number(self.equal_control_tolerance, LARGEST):
+            problems.append(Problem("planning.equal_control_tolerance", self.equal_control_tolerance, A_NUMBER))
+        if self.look_ahead is not None and not _is_positive(self.look_ahead):
+            problems.append(Problem("planning.look_ahead", self.look_ahead, f"{A_POSITIVE_NUMBER} [m]"))
+        if not isinstance(self.closed_loop, bool | np.bool_):
+            problems.append(Problem("planning.closed_loop", self.closed_loop, "True or False"))
+        if problems:
+            raise SettingsError(problems)
+        _keep_floats(self, "horizon", "step", "goal_bias", "equal_control_tolerance", "look_ahead")
+
+    def approaches(self, goal: Goal) -> bool:
+        """Whether final approaches to a goal are tried."""
+        return self.final_approach and not goal.is_position_only
+
+    @property
+    def steps(self) -> int:
+        """Integration steps of a whole extension."""
+        return round(self.horizon / self.step)
+
+    def reference_distance(self, limits: Limits) -> float:
+        """Largest distance of the reference from its node for a robot [m]."""
+        return limits.v_max * self.horizon if self.look_ahead is None else self.look_ahead
+
+
+def _is_positive(value: object) -> bool:
+    """Whether a value is a number above 0 of a size that we can compute with."""
+    return is_number(value, LARGEST) and value >= SMALLEST
+
+
+def _keep_floats(settings: Goal | PlanningSettings, *names: str) -> None:
+    """Turn numbers of other kinds into floats, so that all code computes with the same ones."""
+    for name in names:
+        if getattr(settings, name) is not None:
+            object.__setattr__(settings, name, float(getattr(settings, name)))
+
+
+MAX_SAMPLES = 1_000_000_000
+"""Samples that a plan may draw at most: nodes are counted in 32 bits."""
+
+MAX_STEPS = 100_000
+"""Steps that one extension may have: what a control duration and its buffers are made for."""

@@ -1,0 +1,63 @@
+"""One door to all maps: the reader is chosen by the suffix of the file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from cbrrt_ompl.collision.occupancy import OCCUPIED
+from cbrrt_ompl.errors import MISSING, MapError, Problem, Remark
+from cbrrt_ompl.files import as_path
+from cbrrt_ompl.scenario.maps.image import read_image
+from cbrrt_ompl.scenario.maps.map_server import read_map_server
+from cbrrt_ompl.scenario.maps.movingai import read_movingai
+from cbrrt_ompl.scenario.maps.occupancy_map import OccupancyMap
+
+ROS_SUFFIXES = (".yaml", ".yml")
+IMAGE_SUFFIXES = (".bmp", ".gif", ".jpeg", ".jpg", ".pbm", ".pgm", ".png", ".ppm")
+MOVINGAI_SUFFIX = ".map"
+
+
+def load_map(
+    path: str | Path,
+    *,
+    resolution: float | None = None,
+    origin: Sequence[float] | None = None,
+    unknown: str = "occupied",
+) -> OccupancyMap:
+    """Map from a file.
+
+    Args:
+        path: a ROS map_server map (``.yaml``), an image (``.png``, ``.pgm``, ``.bmp`` and others; dark is occupied), or
+            a MovingAI map (``.map``).
+        resolution: side of a cell [m]; needed but for ROS maps, whose own it replaces.
+        origin: pose (x, y, yaw) of the lower left corner of the map, [m, m, rad]; that of a ROS map, or zero, if not
+            given.
+        unknown: whether unknown cells will count as ``occupied`` or ``free``.
+
+    Returns:
+        The map.
+
+    Raises:
+        MapError: if it cannot be read, in one line a mistake, or if every cell is occupied.
+    """
+    path = as_path(path, MapError)
+    suffix = path.suffix.lower()
+    if suffix in ROS_SUFFIXES:
+        cells, own_resolution, own_origin = read_map_server(path)
+        resolution = own_resolution if resolution is None else resolution
+        origin = own_origin if origin is None else origin
+    elif suffix != MOVINGAI_SUFFIX and suffix not in IMAGE_SUFFIXES:
+        known = ", ".join((*ROS_SUFFIXES, MOVINGAI_SUFFIX, *IMAGE_SUFFIXES))
+        raise MapError(Problem("suffix", suffix or MISSING, f"one of {known}"), str(path))
+    elif resolution is None:
+        raise MapError(
+            Problem("resolution", MISSING, "the side of a cell [m], which the file does not tell"), str(path)
+        )
+    else:
+        cells = read_movingai(path) if suffix == MOVINGAI_SUFFIX else read_image(path)
+    pose = (0.0, 0.0, 0.0) if origin is None else origin
+    found = OccupancyMap(cells, resolution, pose, unknown, str(path))  # type: ignore[arg-type]  # checked in there
+    if (found.cells == OCCUPIED).all():
+        raise MapError(Problem("cells", Remark("only occupied ones"), "a free one"), str(path))
+    return found

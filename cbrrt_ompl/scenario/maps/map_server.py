@@ -1,0 +1,134 @@
+"""ROS map_server maps: a YAML file with an image beside it, read as nav2_map_server reads them, and written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cbrrt_ompl.checks import is_number
+from cbrrt_ompl.collision.occupancy import FREE, FREE_THRESHOLD, OCCUPIED, OCCUPIED_THRESHOLD, UNKNOWN
+from cbrrt_ompl.errors import MISSING, InputError, MapError, Problem
+from cbrrt_ompl.files import write_files
+from cbrrt_ompl.scenario.maps.image import MODES, UNKNOWN_GREY, Reading, cells_of
+from cbrrt_ompl.scenario.maps.pixels import read_pixels
+from cbrrt_ompl.scenario.plain_yaml import dump_line, read_yaml
+
+if TYPE_CHECKING:
+    from cbrrt_ompl.scenario.maps.occupancy_map import OccupancyMap
+
+_GREYS = {OCCUPIED: 0, FREE: 254, UNKNOWN: UNKNOWN_GREY}
+"""What map_saver writes."""
+
+
+def read_map_server(path: Path) -> tuple[NDArray[np.int8], float, tuple[float, float, float]]:
+    """Cells, resolution and origin of a ROS map.
+
+    Required are ``image``, ``resolution`` and ``origin``. Where they are left out, ``mode`` is ``trinary``, ``negate``
+    0, ``occupied_thresh`` 0.65 and ``free_thresh`` 0.196. Other keys are skipped.
+
+    Args:
+        path: the YAML file.
+
+    Returns:
+        Cells, the lowest row first, shape (rows, columns); side of a cell [m]; origin (x, y, yaw) [m, m, rad].
+
+    Raises:
+        MapError: with every mistake in the YAML file, or with why its image cannot be read.
+    """
+    problems: list[Problem] = []
+    try:
+        data = read_yaml(path, problems)
+    except InputError as error:
+        raise MapError(error.problems, str(path)) from None
+    if not isinstance(data, Mapping):
+        problem = Problem("", data, "a mapping with the keys image, resolution, origin")
+        raise MapError(problem, str(path))
+    image = _image(data, path, problems)
+    resolution = _resolution(data, problems)
+    origin = _origin(data, problems)
+    reading = _reading(data, problems)
+    if problems or image is None or resolution is None or origin is None:
+        raise MapError(problems, str(path))
+    return cells_of(read_pixels(image), reading), resolution, origin
+
+
+def write_map_server(grid: OccupancyMap, path: Path) -> None:
+    """Write a map; see :meth:`cbrrt_ompl.scenario.maps.OccupancyMap.save`."""
+    if path.suffix.lower() not in (".yaml", ".yml"):
+        raise MapError(Problem("path", str(path), "a name that ends in .yaml"))
+    image = path.with_suffix(".pgm")
+    rows, columns = grid.cells.shape
+    greys = np.empty((rows, columns), dtype=np.uint8)
+    for cell, grey in _GREYS.items():
+        greys[grid.cells[::-1] == cell] = grey
+    keys = {
+        "image": image.name,
+        "mode": "trinary",
+        "resolution": grid.resolution,
+        "origin": list(grid.origin),
+        "negate": 0,
+        "occupied_thresh": OCCUPIED_THRESHOLD,
+        "free_thresh": FREE_THRESHOLD,
+    }
+    pixels = f"P5\n{columns} {rows}\n255\n".encode("ascii") + greys.tobytes()
+    lines = "".join(f"{dump_line({key: value})}\n" for key, value in keys.items())
+    write_files({image: pixels, path: lines}, MapError)
+
+
+def _image(data: Mapping[object, object], path: Path, problems: list[Problem]) -> Path | None:
+    """The image file, looked for beside the YAML file."""
+    name = data.get("image", MISSING)
+    if not isinstance(name, str) or not name.strip():
+        problems.append(Problem("image", name, "the name of an image file"))
+        return None
+    image = path.parent / name
+    try:
+        if image.is_file():
+            return image
+    except (OSError, ValueError):
+        pass
+    problems.append(Problem("image", name, f"a file that exists, looked for in {path.parent}"))
+    return None
+
+
+def _resolution(data: Mapping[object, object], problems: list[Problem]) -> float | None:
+    value = data.get("resolution", MISSING)
+    if is_number(value) and value > 0.0:
+        return float(value)
+    problems.append(Problem("resolution", value, "the side of a cell, a number above 0 [m]"))
+    return None
+
+
+def _origin(data: Mapping[object, object], problems: list[Problem]) -> tuple[float, float, float] | None:
+    value = data.get("origin", MISSING)
+    if isinstance(value, list) and len(value) == 3 and all(is_number(entry) for entry in value):
+        x, y, yaw = value
+        return float(x), float(y), float(yaw)
+    problems.append(Problem("origin", value, "three finite numbers [x, y, yaw] [m, m, rad]"))
+    return None
+
+
+def _reading(data: Mapping[object, object], problems: list[Problem]) -> Reading:
+    """How the image is to be read; the defaults where the file is wrong."""
+    mode = data.get("mode", "trinary")
+    if mode not in MODES:
+        problems.append(Problem("mode", mode, f"one of {', '.join(MODES)}"))
+    negate = data.get("negate", 0)
+    if not (isinstance(negate, int) and negate in (0, 1)):
+        problems.append(Problem("negate", negate, "0 or 1"))
+    free, occupied = data.get("free_thresh", FREE_THRESHOLD), data.get("occupied_thresh", OCCUPIED_THRESHOLD)
+    wrong = [
+        Problem(name, value, "a number from 0 to 1")
+        for name, value in (("occupied_thresh", occupied), ("free_thresh", free))
+        if not (is_number(value) and 0.0 <= value <= 1.0)
+    ]
+    if not wrong and free > occupied:  # type: ignore[operator]  # both are numbers
+        wrong.append(Problem("free_thresh", free, f"at most occupied_thresh, which is {occupied}"))
+    problems.extend(wrong)
+    if wrong:
+        return Reading()
+    return Reading(str(mode), bool(negate), float(occupied), float(free))  # type: ignore[arg-type]  # as above

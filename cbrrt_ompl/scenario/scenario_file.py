@@ -1,0 +1,363 @@
+"""The format of scenario files: which keys they have, what is read from them and what is written."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cbrrt_ompl.collision.occupancy import UNKNOWN_CELLS
+from cbrrt_ompl.collision.world import World
+from cbrrt_ompl.errors import MISSING, InputError, Problem
+from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, Obstacle, OrientedBox, Polygon
+from cbrrt_ompl.problem.ready_robots import ROBOTS
+from cbrrt_ompl.problem.robot import Footprint, Gains, Limits, Robot
+from cbrrt_ompl.problem.settings import CUT_EXTENSION, NEAREST_NEIGHBOUR, Goal, PlanningSettings, State
+from cbrrt_ompl.scenario.sections import (
+    Key,
+    Report,
+    build,
+    flag,
+    list_of,
+    number,
+    one_of,
+    pair_of,
+    read_partial,
+    read_section,
+    text,
+    whole_number,
+)
+
+if TYPE_CHECKING:
+    from cbrrt_ompl.scenario.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class MapSource:
+    """The map that a world was read from, kept so that a scenario is saved with it and not with its obstacles."""
+
+    file: Path
+    """The map's file, absolute."""
+    obstacles: int
+    """How many of the world's obstacles came from it: the first ones."""
+    unknown: str = "occupied"
+    """What unknown cells count as: ``occupied`` or ``free``."""
+    resolution: float | None = None
+    """Side of a cell [m]; None where the map's file tells it."""
+
+
+def read_parts(data: object, folder: Path, report: Report) -> dict[str, Any]:
+    """Parts of a scenario as far as they can be read.
+
+    Args:
+        data: plain value of a scenario file.
+        folder: what the map's file is relative to.
+        report: where the mistakes go.
+
+    Returns:
+        The attributes of a scenario that were given and right; the world also where single obstacles are wrong.
+    """
+    report.homes = HOMES
+    found = read_partial(data, "", SCENARIO, report)
+    obstacles: list[Obstacle] = found.pop("obstacles", [])
+    bounds: Bounds | None = found.pop("bounds", None)
+    if map_keys := found.pop("map", None):
+        file = folder / map_keys.pop("file")
+        map_bounds, map_obstacles = _load_map(file, report, **map_keys)
+        bounds = bounds or map_bounds
+        found["map"] = MapSource(file.resolve(), len(map_obstacles), **map_keys)
+        obstacles = map_obstacles + obstacles
+    elif isinstance(data, Mapping) and not {"bounds", "map"} & data.keys():
+        report.add("bounds", MISSING, "the corners {min: [x, y], max: [x, y]} [m], or a map")
+    if bounds is not None:
+        found["world"] = build(World, {"bounds": bounds, "obstacles": obstacles}, "obstacles", report)
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def scenario_data(scenario: Scenario, folder: Path) -> dict[str, Any]:
+    """Plain value of a scenario, from which :func:`read_parts` reads equal parts.
+
+    Args:
+        scenario: what to write.
+        folder: what the map's file is to be relative to.
+
+    Returns:
+        Mappings, lists, texts and numbers, angles in radians.
+    """
+    world, source = scenario.world, scenario.map
+    data: dict[str, Any] = {
+        "name": scenario.name,
+        "bounds": _box_data(world.bounds),
+        "obstacles": [_obstacle_data(o) for o in world.obstacles[source.obstacles if source else 0 :]],
+    }
+    if source is not None:
+        resolution = {} if source.resolution is None else {"resolution": float(source.resolution)}
+        data["map"] = {"file": _relative(source.file, folder), "unknown": source.unknown, **resolution}
+    return data | {
+        "robot": _robot_data(scenario.robot),
+        "start": {name: float(value) for name, value in scenario.start._asdict().items()},
+        "goal": _goal_data(scenario.goal),
+        "planning": _planning_data(scenario.planning),
+    }
+
+
+_POINT = "a point [x, y] of finite numbers [m]"
+_pair = pair_of(_POINT)
+_corners = list_of(_pair, "a list of corners [[x, y], ...] [m]")
+_range = pair_of("a range [low, high] of finite numbers")
+_x, _y = Key(number, required="a number [m]"), Key(number, required="a number [m]")
+_rectangle = {"min": Key(_pair, required=_POINT), "max": Key(_pair, required=_POINT)}
+
+
+def _bounds(value: object, path: str, report: Report) -> Bounds | None:
+    return build(Bounds, read_section(value, path, _rectangle, report), path, report)
+
+
+def obstacle(value: object, path: str, report: Report) -> Obstacle | None:
+    """An obstacle of any type."""
+    kinds: dict[str, type] = {"box": Box, "oriented_box": OrientedBox, "disc": Disc, "polygon": Polygon}
+    kind = _kind(value, path, OBSTACLES, report)
+    return None if kind is None else build(kinds[kind], _shape(value, path, OBSTACLES[kind], report), path, report)
+
+
+def _footprint(value: object, path: str, report: Report) -> Footprint | None:
+    makers = {"disc": Footprint.disc, "polygon": Footprint.polygon}
+    kind = _kind(value, path, FOOTPRINTS, report)
+    return None if kind is None else build(makers[kind], _shape(value, path, FOOTPRINTS[kind], report), path, report)
+
+
+def _kind(value: object, path: str, kinds: Mapping[str, Mapping[str, Key]], report: Report) -> str | None:
+    """The type of a shape."""
+    if not isinstance(value, Mapping):
+        report.add(path, value, f"a mapping with a type: {', '.join(kinds)}")
+        return None
+    kind: str | None = one_of(list(kinds))(value.get("type", MISSING), f"{path}.type", report)
+    return kind
+
+
+def _shape(value: object, path: str, keys: Mapping[str, Key], report: Report) -> dict[str, Any] | None:
+    """The values of a shape, without its type."""
+    values = read_section(value, path, {"type": Key(text), **keys}, report)
+    return values and {name: value for name, value in values.items() if name != "type"}
+
+
+def _map(value: object, path: str, report: Report) -> dict[str, Any] | None:
+    section = {"file": value} if isinstance(value, str) else value
+    values = read_section(section, path, MAP, report)
+    return values and {"unknown": "occupied", **values}
+
+
+def _load_map(
+    file: Path, report: Report, unknown: str, resolution: float | None = None
+) -> tuple[Bounds | None, list[Obstacle]]:
+    """Bounds and obstacles of a map; none where it cannot be read."""
+    from cbrrt_ompl.scenario.maps.loading import load_map
+
+    try:
+        loaded = load_map(file, resolution=resolution)
+        return loaded.bounds(), loaded.obstacles(unknown)
+    except InputError as error:
+        where = f"map: {error.source}" if error.source else "map"
+        report.adopt(
+            [Problem(f"{where}: {p.field}" if p.field else where, p.value, p.expected) for p in error.problems]
+        )
+        return None, []
+
+
+def _limits(value: object, path: str, report: Report) -> dict[str, Any] | None:
+    """The limits that are given, by their names in `Limits`."""
+    values = read_section(value, path, LIMITS, report)
+    if values is None:
+        return None
+    for name in {"v", "omega"} & values.keys():
+        values[f"{name}_min"], values[f"{name}_max"] = values.pop(name)
+    return values
+
+
+def _gains(value: object, path: str, report: Report) -> dict[str, Any] | None:
+    """The gains that are given."""
+    return read_section(value, path, GAINS, report)
+
+
+def _model(value: object, path: str, report: Report) -> Robot | None:
+    name = one_of(list(ROBOTS))(value, path, report)
+    return None if name is None else ROBOTS[name]
+
+
+def _robot(value: object, path: str, report: Report) -> Robot | None:
+    """A ready robot by its name; or one described in full, or by what differs from a ready one."""
+    if isinstance(value, str):
+        return _model(value, path, report)
+    values = read_section(value, path, ROBOT, report)
+    if values is None:
+        return None
+    model = values.pop("model", Robot())
+    for part in {"limits", "gains"} & values.keys():
+        values[part] = getattr(model, part)._replace(**values[part])
+    return build(partial(replace, model), values, path, report)
+
+
+def _start(value: object, path: str, report: Report) -> State | None:
+    return build(State, read_section(value, path, START, report), path, report)
+
+
+def _goal(value: object, path: str, report: Report) -> Goal | None:
+    values = read_section(value, path, GOAL, report)
+    if values is not None and "heading_tolerance" in values and "theta" not in values:
+        report.add(f"{path}.theta", MISSING, f"the heading that {path}.heading_tolerance is about [rad]")
+        return None
+    return build(Goal, values, path, report)
+
+
+def _planning(value: object, path: str, report: Report) -> PlanningSettings | None:
+    return build(PlanningSettings, read_section(value, path, PLANNING, report), path, report)
+
+
+OBSTACLES: dict[str, dict[str, Key]] = {
+    "box": _rectangle,
+    "oriented_box": {
+        "center": Key(_pair, required=_POINT),
+        "size": Key(pair_of("two sides [length, width] [m]"), required="two sides [length, width] [m]"),
+        "angle": Key(number, required="the direction of the first side [rad]", is_angle=True),
+    },
+    "disc": {"center": Key(_pair, required=_POINT), "radius": Key(number, required="a radius above 0 [m]")},
+    "polygon": {
+        "vertices": Key(_corners, required="a list of corners [[x, y], ...] [m]"),
+        "holes": Key(list_of(_corners, "a list of rings, each a list of corners")),
+    },
+}
+FOOTPRINTS: dict[str, dict[str, Key]] = {
+    "disc": {"radius": Key(number, required="a radius of 0 or more [m]")},
+    "polygon": {"vertices": Key(_corners, required="a list of corners [[x, y], ...] [m] in the robot's frame")},
+}
+MAP = {
+    "file": Key(text, required="the name of a map's file"),
+    "unknown": Key(one_of(UNKNOWN_CELLS)),
+    "resolution": Key(number),
+}
+LIMITS = {
+    "v": Key(_range),
+    "omega": Key(_range, is_angle=True),
+    "acceleration": Key(number),
+    "angular_acceleration": Key(number, is_angle=True),
+    "wheel_separation": Key(number),
+    "wheel_speed": Key(number),
+    "wheel_acceleration": Key(number),
+}
+GAINS = {name: Key(number) for name in Gains._fields}
+ROBOT = {"model": Key(_model), "footprint": Key(_footprint), "limits": Key(_limits), "gains": Key(_gains)}
+START = {
+    "x": _x,
+    "y": _y,
+    "theta": Key(number, is_angle=True),
+    "v": Key(number),
+    "omega": Key(number, is_angle=True),
+}
+GOAL = {
+    "x": _x,
+    "y": _y,
+    "tolerance": Key(number),
+    "theta": Key(number, is_angle=True),
+    "heading_tolerance": Key(number, is_angle=True),
+    "speed_tolerance": Key(number),
+}
+PLANNING = {
+    "horizon": Key(number),
+    "step": Key(number),
+    "goal_bias": Key(number),
+    "max_samples": Key(whole_number),
+    "cut_extension": Key(one_of(CUT_EXTENSION)),
+    "equal_control_tolerance": Key(number),
+    "look_ahead": Key(number),
+    "closed_loop": Key(flag),
+    "final_approach": Key(flag),
+    "brake_safe": Key(flag),
+    "nearest_neighbour": Key(one_of(NEAREST_NEIGHBOUR)),
+}
+SCENARIO = {
+    "name": Key(text, required="one line of text"),
+    "bounds": Key(_bounds),
+    "obstacles": Key(list_of(obstacle, "a list of obstacles")),
+    "map": Key(_map),
+    "robot": Key(_robot),
+    "start": Key(_start, required="the state to start in, {x: 0.0, y: 0.0, theta: 0.0} [m, m, rad]"),
+    "goal": Key(_goal, required="the goal region, {x: 0.0, y: 0.0, tolerance: 0.5} [m]"),
+    "planning": Key(_planning),
+}
+HOMES = {
+    **dict.fromkeys(("tolerance", "heading_tolerance", "speed_tolerance"), "goal"),
+    **dict.fromkeys(PLANNING, "planning"),
+    **dict.fromkeys(LIMITS, "robot.limits"),
+    **dict.fromkeys(GAINS, "robot.gains"),
+    **dict.fromkeys(ROBOT, "robot"),
+    **dict.fromkeys(("bounds", "obstacles", "start", "goal", "planning"), "the top level"),
+}
+"""Where a key belongs that stands in another section."""
+
+
+def _box_data(box: Bounds | Box) -> dict[str, Any]:
+    return {"min": _floats(box.min), "max": _floats(box.max)}
+
+
+def _obstacle_data(obstacle: Obstacle) -> dict[str, Any]:
+    if isinstance(obstacle, Box):
+        return {"type": "box", **_box_data(obstacle)}
+    if isinstance(obstacle, OrientedBox):
+        center, size = _floats(obstacle.center), _floats(obstacle.size)
+        return {"type": "oriented_box", "center": center, "size": size, "angle": float(obstacle.angle)}
+    if isinstance(obstacle, Disc):
+        return {"type": "disc", "center": _floats(obstacle.center), "radius": float(obstacle.radius)}
+    holes = {"holes": [ring.tolist() for ring in obstacle.holes]} if obstacle.holes else {}
+    return {"type": "polygon", "vertices": obstacle.vertices.tolist(), **holes}
+
+
+def _robot_data(robot: Robot) -> dict[str, Any]:
+    footprint, limits = robot.footprint, robot.limits
+    return {
+        "footprint": {"type": "disc", "radius": float(footprint.radius)}
+        if footprint.vertices is None
+        else {"type": "polygon", "vertices": footprint.vertices.tolist()},
+        "limits": {
+            "v": _floats((limits.v_min, limits.v_max)),
+            "omega": _floats((limits.omega_min, limits.omega_max)),
+            "acceleration": float(limits.acceleration),
+            "angular_acceleration": float(limits.angular_acceleration),
+            **_wheel_data(limits),
+        },
+        "gains": {name: float(value) for name, value in robot.gains._asdict().items()},
+    }
+
+
+def _wheel_data(limits: Limits) -> dict[str, float]:
+    """The limits of the wheels that there are."""
+    separation = {"wheel_separation": float(limits.wheel_separation)} if limits.wheel_separation else {}
+    given = {name: float(getattr(limits, name)) for name in ("wheel_speed", "wheel_acceleration")}
+    return separation | {name: value for name, value in given.items() if value < math.inf}
+
+
+def _goal_data(goal: Goal) -> dict[str, Any]:
+    """The goal; a heading tolerance without a heading has no meaning and is left out."""
+    skipped = {"heading_tolerance"} if goal.theta is None else set()
+    return {name: float(value) for name, value in asdict(goal).items() if value is not None and name not in skipped}
+
+
+def _planning_data(planning: PlanningSettings) -> dict[str, Any]:
+    """The settings, numbers of NumPy turned into Python's."""
+    given = {name: value for name, value in asdict(planning).items() if value is not None}
+    return {name: value.item() if hasattr(value, "item") else value for name, value in given.items()}
+
+
+def _floats(values: tuple[float, float]) -> list[float]:
+    return [float(value) for value in values]
+
+
+def _relative(file: Path, folder: Path) -> str:
+    """A file's path as seen from a folder, with forward slashes."""
+    try:
+        return Path(os.path.relpath(file, folder)).as_posix()
+    except ValueError:  # another drive
+        return file.as_posix()

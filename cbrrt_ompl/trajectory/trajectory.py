@@ -1,0 +1,477 @@
+"""Trajectories: states and commands over time, as planned, saved and loaded."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cbrrt_ompl.checks import is_number
+from cbrrt_ompl.errors import MISSING, Problem, TrajectoryError
+from cbrrt_ompl.files import as_path, write_file
+from cbrrt_ompl.problem.settings import MAX_STEPS
+
+if TYPE_CHECKING:
+    from cbrrt_ompl.problem.robot import Limits
+
+COLUMNS = ("t", "x", "y", "theta", "v", "omega", "v_command", "omega_command")
+"""The arrays of a trajectory, in the order of the CSV header."""
+
+STANDING_SPEED = 1e-6
+"""Forward velocities below this are standing still [m/s]."""
+
+SMALLEST_POINT_TURN = math.radians(1.0)
+"""Turns on the spot up to this are none [rad]."""
+
+_NODES, _WEIGHTS = ((1.0 + np.polynomial.legendre.leggauss(8)[0]) / 2.0, np.polynomial.legendre.leggauss(8)[1] / 2.0)
+"""Gauss-Legendre rule on [0, 1], exact for polynomials of degree 15."""
+
+
+class PointTurn(NamedTuple):
+    """A stretch in which the robot turns on the spot."""
+
+    start: float
+    """Time at which it stands [s]."""
+    end: float
+    """Time at which it moves on [s]."""
+    x: float
+    """Position [m]."""
+    y: float
+    """Position [m]."""
+    angle: float
+    """Heading at the end minus that at the start, counted through full turns [rad]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """States and commands over time.
+
+    Row k is the state at ``t[k]``; its command acts from ``t[k]`` to ``t[k + 1]``; the last row repeats the command
+    before it. Between the rows, v and omega are linear in time. Where ``kinematic`` is set (S-RRT), they jump instead:
+    from ``t[k]`` to ``t[k + 1]`` they are the command of row k, and row k + 1 still holds it.
+
+    The arrays are copied and read-only, each of shape (n,) with n >= 1.
+
+    Raises:
+        TrajectoryError: with every array that is not finite, not one-dimensional or of another length than ``t``,
+            or if ``t`` does not increase strictly.
+    """
+
+    t: NDArray[np.float64]
+    """Times [s]."""
+    x: NDArray[np.float64]
+    """Positions [m]."""
+    y: NDArray[np.float64]
+    """Positions [m]."""
+    theta: NDArray[np.float64]
+    """Headings [rad]; planners wrap them to [-pi, pi)."""
+    v: NDArray[np.float64]
+    """Forward velocities [m/s]."""
+    omega: NDArray[np.float64]
+    """Turning rates [rad/s]."""
+    v_command: NDArray[np.float64]
+    """Commanded forward velocities [m/s]."""
+    omega_command: NDArray[np.float64]
+    """Commanded turning rates [rad/s]."""
+    kinematic: bool = field(default=False, kw_only=True)
+    """Whether the velocities jump to their commands."""
+    limits: Limits | None = field(default=None, kw_only=True)
+    """Limits of the robot that it was planned for, if they are known; no part of its equality or of its files."""
+
+    def __post_init__(self) -> None:
+        """Check, copy and freeze the arrays."""
+        arrays = {name: _array(name, getattr(self, name)) for name in COLUMNS}
+        problems = _problems(arrays, lambda name, row: f"{name}[{row}]")
+        if problems:
+            raise TrajectoryError(problems)
+        if not isinstance(self.kinematic, bool | np.bool_):
+            raise TrajectoryError(Problem("kinematic", self.kinematic, "True or False"))
+        for name, array in arrays.items():
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+        object.__setattr__(self, "kinematic", bool(self.kinematic))
+
+    def __len__(self) -> int:
+        """Number of rows."""
+        return len(self.t)
+
+    def __eq__(self, other: object) -> bool:
+        """Equal where all arrays are, number for number, and the model is the same."""
+        if not isinstance(other, Trajectory):
+            return NotImplemented
+        same = (np.array_equal(getattr(self, name), getattr(other, name)) for name in COLUMNS)
+        return self.kinematic == other.kinematic and all(same)
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last row [s]."""
+        return float(self.t[-1] - self.t[0])
+
+    @property
+    def length(self) -> float:
+        """Way driven, backwards and forwards alike: the integral of the speed [m]."""
+        v0, v1 = self.step_velocities[:2]
+        area = 0.5 * np.abs(v0 + v1)
+        crosses = v0 * v1 < 0.0
+        area[crosses] = 0.5 * (v0[crosses] ** 2 + v1[crosses] ** 2) / np.abs(v1 - v0)[crosses]
+        return float(np.sum(area * np.diff(self.t)))
+
+    @property
+    def poses(self) -> NDArray[np.float64]:
+        """Rows of (x, y, theta), shape (n, 3) [m, m, rad]."""
+        return np.column_stack([self.x, self.y, self.theta])
+
+    @property
+    def states(self) -> NDArray[np.float64]:
+        """Rows of (x, y, theta, v, omega), shape (n, 5) [m, m, rad, m/s, rad/s]."""
+        return np.column_stack([self.x, self.y, self.theta, self.v, self.omega])
+
+    @property
+    def step_velocities(self) -> NDArray[np.float64]:
+        """Velocities at both ends of each step: v, v at the end, omega, omega at the end, shape (4, n - 1)."""
+        if self.kinematic:
+            v, omega = self.v_command[:-1], self.omega_command[:-1]
+            return np.array([v, v, omega, omega])
+        return np.array([self.v[:-1], self.v[1:], self.omega[:-1], self.omega[1:]])
+
+    @property
+    def point_turns(self) -> list[PointTurn]:
+        """Longest stretches of standing still in which the heading turns through more than a degree."""
+        v0, v1 = self.step_velocities[:2]
+        standing = (np.abs(v0) < STANDING_SPEED) & (np.abs(v1) < STANDING_SPEED)
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], standing, [False]])))
+        turned = wrapped(np.diff(self.theta))
+        return [
+            PointTurn(*(float(value) for value in (self.t[a], self.t[b], self.x[a], self.y[a], turned[a:b].sum())))
+            for a, b in edges.reshape(-1, 2)
+            if np.abs(turned[a:b]).sum() > SMALLEST_POINT_TURN
+        ]
+
+    def at(self, times: ArrayLike) -> NDArray[np.float64]:
+        """States at any times, by the trajectory's own model from the row before.
+
+        Args:
+            times: times from ``t[0]`` to ``t[-1]``, shape (m,) or a number [s].
+
+        Returns:
+            Rows of (x, y, theta, v, omega), shape (m, 5) [m, m, rad, m/s, rad/s]; the stored rows at their times.
+
+        Raises:
+            TrajectoryError: if a time is no number, or outside the trajectory.
+        """
+        times = _array("times", [times] if is_number(times) else times)
+        outside = ~((times >= self.t[0]) & (times <= self.t[-1]))
+        if outside.any():
+            expected = f"times from {self.t[0]:g} to {self.t[-1]:g} s"
+            raise TrajectoryError(Problem("times", float(times[outside][0]), expected))
+        row = np.searchsorted(self.t, times, side="right") - 1
+        states = self.states[row]  # (m, 5)
+        between = times > self.t[row]
+        row = row[between]
+        elapsed = times[between] - self.t[row]
+        v0, v1, w0, w1 = self.step_velocities[:, row]
+        share = elapsed / (self.t[row + 1] - self.t[row])
+        v, omega = v0 + (v1 - v0) * share, w0 + (w1 - w0) * share
+        poses = self.poses[row] + displacement(self.theta[row], v0, v, w0, omega, elapsed)
+        states[between] = np.column_stack([poses[:, :2], wrapped(poses[:, 2]), v, omega])
+        return states
+
+    def stopping_at(self, t: float, limits: Limits | None = None, step: float | None = None) -> Trajectory:
+        """Drive on until a time and then brake to rest: v and omega at once, each under its full deceleration.
+
+        Braking begins at the first row at or after the time. A kinematic trajectory stands after one more step.
+
+        Args:
+            t: time from ``t[0]`` to ``t[-1]`` [s].
+            limits: limits of the robot; those of the trajectory if not given.
+            step: integration step while braking [s]; that of the trajectory at this row if not given.
+
+        Returns:
+            The rows up to there and those of the braking, which ends with v = omega = 0; nothing is added to a row
+            that is at rest already.
+
+        Raises:
+            TrajectoryError: if the time is outside the trajectory, the limits or the step are neither given nor known,
+                or no robot has such limits or comes to rest in `MAX_STEPS` steps.
+        """
+        if not self.t[0] <= t <= self.t[-1]:
+            raise TrajectoryError(Problem("t", t, f"a time from {self.t[0]:g} to {self.t[-1]:g} s"))
+        row = int(np.searchsorted(self.t, t))
+        at_rest = self.v[row] == 0.0 and self.omega[row] == 0.0
+        limits = self.limits if limits is None else limits
+        step = self._step_at(row) if step is None else step
+        problems = [] if limits is None else limits.problems()
+        if limits is None and not (self.kinematic or at_rest):
+            problems.append(Problem("limits", MISSING, "the limits of the robot: the trajectory has none of its own"))
+        if not at_rest and not (math.isfinite(step) and step > 0.0):
+            problems.append(Problem("step", MISSING if math.isnan(step) else step, "an integration step above 0 [s]"))
+        if problems:
+            raise TrajectoryError(problems)
+        states = self.states[row : row + 1] if at_rest else self._braking(row, limits, step)  # (m + 1, 5)
+        commands = np.column_stack([self.v_command, self.omega_command])[: row + 1]
+        commands[row] = commands[row - 1] if at_rest and row > 0 else 0.0
+        times = self.t[row] + step * np.arange(1, len(states))
+        return Trajectory(
+            np.concatenate([self.t[: row + 1], times]),
+            *np.concatenate([self.states[:row], states]).T,
+            *np.concatenate([commands, np.zeros((len(times), 2))]).T,
+            kinematic=self.kinematic,
+            limits=limits,
+        )
+
+    def _step_at(self, row: int) -> float:
+        """Duration of the step after a row, or before the last one [s]; NaN where there is only one row."""
+        return float(np.diff(self.t)[min(row, len(self) - 2)]) if len(self) > 1 else math.nan
+
+    def _braking(self, row: int, limits: Limits | None, step: float) -> NDArray[np.float64]:
+        """States of the braking from a row on, shape (m + 1, 5)."""
+        from cbrrt_ompl.motion.kinematics import brake  # here, since files are read and verified without any kernel
+
+        if self.kinematic:
+            return np.array([self.states[row], [*self.poses[row], 0.0, 0.0]])
+        assert limits is not None
+        x, y, theta, v, omega = self.states[row].tolist()
+        states = brake(x, y, theta, v, omega, limits, step, MAX_STEPS)
+        if len(states) > MAX_STEPS:
+            expected = f"a step in which {MAX_STEPS} of them bring the robot to rest"
+            raise TrajectoryError(Problem("step", step, expected))
+        return np.asarray(states)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a CSV, NPZ or JSON file, by the suffix; an existing file stays whole until the new one is.
+
+        Args:
+            path: the file; CSV has no room for ``kinematic``.
+
+        Raises:
+            TrajectoryError: if the suffix is another one or the file cannot be written.
+        """
+        path = as_path(path, TrajectoryError)
+        write_file(path, _FORMATS[_suffix(path)].encode(self), TrajectoryError)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], kinematic: bool = False) -> Trajectory:
+        """Read a file that :meth:`save` wrote.
+
+        Args:
+            path: a CSV, NPZ or JSON file, by its suffix.
+            kinematic: the model of a CSV file, which has no room for it; the other formats know it themselves.
+
+        Returns:
+            The trajectory, number for number.
+
+        Raises:
+            TrajectoryError: if the file is missing, has another suffix or holds no trajectory.
+        """
+        path = as_path(path, TrajectoryError)
+        decode = _FORMATS[_suffix(path)].decode
+        try:
+            content = path.read_bytes()
+        except FileNotFoundError:
+            raise TrajectoryError(Problem("", MISSING, "a trajectory file"), str(path)) from None
+        except OSError as error:
+            raise TrajectoryError(Problem("", error.strerror, "a readable file"), str(path)) from error
+        try:
+            return cls(**{"kinematic": kinematic, **decode(content)})
+        except TrajectoryError as error:
+            raise TrajectoryError(error.problems, str(path)) from error
+
+
+def wrapped(angle: ArrayLike) -> NDArray[np.float64]:
+    """Angles brought to [-pi, pi), any shape [rad]."""
+    turned = np.mod(np.asarray(angle, dtype=float) + np.pi, 2.0 * np.pi) - np.pi
+    return np.where(turned >= np.pi, -np.pi, turned)  # the remainder of a tiny negative number rounds to 2 pi
+
+
+def displacement(
+    theta: NDArray[np.float64],
+    v: NDArray[np.float64],
+    v_end: NDArray[np.float64],
+    omega: NDArray[np.float64],
+    omega_end: NDArray[np.float64],
+    dt: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Change of pose over spans in which both velocities are linear in time; every argument has shape (n,).
+
+    The heading is exact; the position is a Gauss-Legendre quadrature of order 16.
+
+    Args:
+        theta: headings at the beginning [rad].
+        v: forward velocities at the beginning [m/s].
+        v_end: forward velocities at the end [m/s].
+        omega: turning rates at the beginning [rad/s].
+        omega_end: turning rates at the end [rad/s].
+        dt: durations [s].
+
+    Returns:
+        Changes of (x, y, theta), not wrapped, shape (n, 3) [m, m, rad].
+    """
+    share = _NODES[:, None]
+    heading = theta + dt * share * (omega + 0.5 * (omega_end - omega) * share)  # (8, n)
+    way = dt * _WEIGHTS[:, None] * (v + (v_end - v) * share)  # (8, n)
+    turn = dt * 0.5 * (omega + omega_end)
+    return np.column_stack([(way * np.cos(heading)).sum(axis=0), (way * np.sin(heading)).sum(axis=0), turn])
+
+
+def _array(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """A copy of the values as floats.
+
+    Raises:
+        TrajectoryError: if they are no array of real numbers.
+    """
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        array = np.empty(0, dtype=object)
+    if array.dtype.kind not in "fiu" or array.ndim != 1:
+        raise TrajectoryError(Problem(name, values, "a one-dimensional array of numbers"))
+    return array.astype(np.float64)
+
+
+def _problems(arrays: Mapping[str, NDArray[np.float64]], place: Callable[[str, int], str]) -> list[Problem]:
+    """What keeps the arrays from being a trajectory.
+
+    Args:
+        arrays: the columns by name, one-dimensional.
+        place: name for messages of the value in a column and a row.
+    """
+    rows = len(arrays["t"])
+    if rows == 0:
+        return [Problem("t", [], "at least one row")]
+    found = [
+        Problem(name, f"{len(array)} values", f"{rows} values, as many as t")
+        for name, array in arrays.items()
+        if len(array) != rows
+    ]
+    for name, array in arrays.items():
+        for row in np.flatnonzero(~np.isfinite(array))[:1]:
+            found.append(Problem(place(name, row), float(array[row]), "a finite number"))
+    if not found:
+        t = arrays["t"]
+        for row in np.flatnonzero(t[1:] <= t[:-1])[:1] + 1:
+            found.append(Problem(place("t", row), float(t[row]), f"a time above {float(t[row - 1])!r}, the one before"))
+    return found
+
+
+def _suffix(path: Path) -> str:
+    """The suffix in lower case.
+
+    Raises:
+        TrajectoryError: if no format has it.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in _FORMATS:
+        raise TrajectoryError(Problem("suffix", path.suffix, f"one of {', '.join(sorted(_FORMATS))}"), str(path))
+    return suffix
+
+
+def _encode_csv(trajectory: Trajectory) -> bytes:
+    rows = np.column_stack([getattr(trajectory, name) for name in COLUMNS]).tolist()
+    lines = [",".join(COLUMNS), *(",".join(map(repr, row)) for row in rows)]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _decode_csv(content: bytes) -> dict[str, Any]:
+    header, *lines = _text(content).rstrip("\r\n").split("\n")
+    if header.rstrip() != ",".join(COLUMNS):
+        raise TrajectoryError(Problem("line 1", header, f"the header {','.join(COLUMNS)}"))
+    rows = [_csv_row(line, number) for number, line in enumerate(lines, start=2)]
+    columns = dict(zip(COLUMNS, np.array(rows).reshape(-1, len(COLUMNS)).T, strict=True))
+    problems = _problems(columns, lambda name, row: f"line {row + 2}, {name}")
+    if problems:
+        raise TrajectoryError(problems)
+    return columns
+
+
+def _csv_row(line: str, number: int) -> list[float]:
+    """The numbers of one line."""
+    cells = line.split(",")
+    if len(cells) != len(COLUMNS):
+        raise TrajectoryError(Problem(f"line {number}", f"{len(cells)} values", f"{len(COLUMNS)} values"))
+    row = []
+    for name, cell in zip(COLUMNS, cells, strict=True):
+        try:
+            row.append(float(cell))
+        except ValueError:
+            raise TrajectoryError(Problem(f"line {number}, {name}", cell.strip(), "a number")) from None
+    return row
+
+
+def _encode_npz(trajectory: Trajectory) -> bytes:
+    buffer = io.BytesIO()
+    arrays = {name: getattr(trajectory, name) for name in COLUMNS}
+    np.savez(buffer, kinematic=np.array(trajectory.kinematic), **arrays)
+    return buffer.getvalue()
+
+
+def _decode_npz(content: bytes) -> dict[str, Any]:
+    try:
+        with np.load(io.BytesIO(content), allow_pickle=False) as archive:
+            values = dict(archive)
+    except Exception as error:  # a damaged archive fails in zipfile, zlib or NumPy, in a dozen ways
+        raise TrajectoryError(Problem("", str(error), "an undamaged NPZ archive")) from error
+    kinematic = values.get("kinematic")
+    if kinematic is not None and kinematic.shape == ():
+        values["kinematic"] = kinematic.item()
+    return _checked_names(values)
+
+
+def _encode_json(trajectory: Trajectory) -> bytes:
+    arrays = {name: getattr(trajectory, name).tolist() for name in COLUMNS}
+    return (json.dumps({"kinematic": trajectory.kinematic, **arrays}) + "\n").encode()
+
+
+def _decode_json(content: bytes) -> dict[str, Any]:
+    text = _text(content)
+    try:
+        values = json.loads(text)
+    except json.JSONDecodeError as error:
+        where = f"line {error.lineno}, column {error.colno}"
+        raise TrajectoryError(Problem(where, error.msg, "whole and valid JSON")) from error
+    except (ValueError, RecursionError) as error:
+        raise TrajectoryError(Problem("", str(error), "JSON of a trajectory")) from error
+    if not isinstance(values, dict):
+        raise TrajectoryError(Problem("", values, f"an object with {', '.join(COLUMNS)} and kinematic"))
+    return _checked_names(values)
+
+
+def _text(content: bytes) -> str:
+    """The text of a file, with one kind of line end."""
+    try:
+        return content.decode("utf-8-sig").replace("\r\n", "\n")
+    except UnicodeDecodeError as error:
+        raise TrajectoryError(Problem("", error.reason, "text in UTF-8")) from error
+
+
+def _checked_names(values: dict[str, Any]) -> dict[str, Any]:
+    """The values of an NPZ or JSON file, if they are all there and no others."""
+    expected = f"the entries {', '.join(COLUMNS)} and kinematic"
+    problems = [Problem(name, MISSING, expected) for name in (*COLUMNS, "kinematic") if name not in values]
+    problems += [Problem("", name, expected) for name in values if name not in (*COLUMNS, "kinematic")]
+    if not problems and not isinstance(values["kinematic"], bool):
+        problems.append(Problem("kinematic", values["kinematic"], "true or false"))
+    if problems:
+        raise TrajectoryError(problems)
+    return values
+
+
+class _Format(NamedTuple):
+    """How one file format is written and read."""
+
+    encode: Callable[[Trajectory], bytes]
+    decode: Callable[[bytes], dict[str, Any]]
+
+
+_FORMATS = {
+    ".csv": _Format(_encode_csv, _decode_csv),
+    ".json": _Format(_encode_json, _decode_json),
+    ".npz": _Format(_encode_npz, _decode_npz),
+}
