@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 
 from cbrrt_ompl.checks import is_number
-from cbrrt_ompl.collision.clearance_map import clearance_map_for
 from cbrrt_ompl.errors import Problem, SettingsError, UnknownPlannerError
-from cbrrt_ompl.motion.model import check_step, law_of, pack_model
+from cbrrt_ompl.motion.model import check_step, law_of, make_model
 from cbrrt_ompl.planners.search import COMPILED_PLANNERS, ROBUST, Search
 from cbrrt_ompl.planners.warm_up import warm_up
 from cbrrt_ompl.scenario.scenario import Scenario, check_scenario
@@ -151,8 +150,9 @@ def _plan_compiled(scenario: Scenario, planner: str, seed: int | None, watch: _W
     """Plan with the compiled loop, without OMPL."""
     planning = scenario.planning
     search = Search(
-        pack_model(law_of(planner, planning), scenario.robot, scenario.goal, planning),
-        clearance_map_for(scenario.world, scenario.robot.footprint),
+        make_model(law_of(planner, planning), scenario.robot, scenario.goal, planning),
+        scenario.world,
+        scenario.robot.footprint,
         [scenario.start],
         seed,
         goal_bias=planning.goal_bias,
@@ -193,7 +193,7 @@ def _plan_in_ompl(scenario: Scenario, planner: str, seed: int | None, watch: _Wa
 
 def _already_there(scenario: Scenario, planner: str, seed: int | None) -> PlanResult:
     """The plan of a robot that starts in its goal region: stay."""
-    model = pack_model(law_of(planner, scenario.planning), scenario.robot, scenario.goal, scenario.planning)
+    model = make_model(law_of(planner, scenario.planning), scenario.robot, scenario.goal, scenario.planning)
     start = np.array([scenario.start], dtype=float)
     stay = trajectory_from_controls(start[0], np.empty((0, 3)), np.empty(0, dtype=np.int64), model)
     tree = Tree(start, np.array([-1]), np.empty((0, 2)))

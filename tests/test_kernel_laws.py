@@ -6,12 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from kernels import findings
-from strategies import SHARES, WHEELED
-
-from cbrrt_ompl.collision import clearance_map
 from cbrrt_ompl.collision.clearance_map import (
     COLLISION,
     GOOD_MARGIN,
@@ -24,12 +18,18 @@ from cbrrt_ompl.collision.clearance_map import (
     find_leaf,
 )
 from cbrrt_ompl.collision.disc_tree import disc_tree
+from hypothesis import given
+from hypothesis import strategies as st
+from kernels import findings
+from strategies import SHARES, WHEELED
+
+from cbrrt_ompl.collision import clearance_map
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.motion.kinematics import (
+    axis_limits,
     dynamic_step,
     joint_ramp,
     joint_ramp_time,
-    pure_limits,
     saturate,
     sine_cosine,
     stopping_time,
@@ -62,23 +62,23 @@ class TestSineAndCosine:
 
 class TestPureLimits:
     def test_by_hand(self) -> None:
-        found = pure_limits(EITHER)
+        found = axis_limits(EITHER)
         assert found == pytest.approx((-0.5, 0.5, -2.0, 2.5, 0.7, 2.5, 0.4, 0.5, 0.7), rel=1e-14)
-        assert pure_limits(EITHER._replace(angular_acceleration=9.0)).angular_acceleration == pytest.approx(3.5)
+        assert axis_limits(EITHER._replace(angular_acceleration=9.0)).angular_acceleration == pytest.approx(3.5)
 
     def test_a_robot_without_wheel_limits_has_its_own(self) -> None:
         limits = Limits(-0.3, 1.0, -0.4, 0.6, 0.9, 2.5, wheel_separation=0.4)
-        assert pure_limits(limits) == limits
+        assert axis_limits(limits) == limits
 
     @given(WHEELED)
     def test_the_wheels_can_drive_straight_on_and_turn_on_the_spot_as_fast(self, limits: Limits) -> None:
-        pure = pure_limits(limits)
+        pure = axis_limits(limits)
         for command in [(pure.v_min, 0.0), (pure.v_max, 0.0), (0.0, pure.omega_min), (0.0, pure.omega_max)]:
             assert saturate(*command, limits) == command
 
     @given(WHEELED)
     def test_nothing_faster_would_do(self, limits: Limits) -> None:
-        pure, arm = pure_limits(limits), 0.5 * limits.wheel_separation
+        pure, arm = axis_limits(limits), 0.5 * limits.wheel_separation
         assert pure.v_max == min(limits.v_max, limits.wheel_speed)
         assert pure.v_min == max(limits.v_min, -limits.wheel_speed)
         assert pure.omega_max == pytest.approx(min(limits.omega_max, limits.wheel_speed / arm), rel=1e-14)
@@ -86,7 +86,7 @@ class TestPureLimits:
 
     @given(WHEELED)
     def test_a_pure_ramp_takes_a_second_to_its_acceleration(self, limits: Limits) -> None:
-        pure = pure_limits(limits)
+        pure = axis_limits(limits)
         assert joint_ramp_time(pure.acceleration, 0.0, limits) == pytest.approx(1.0, rel=1e-14)
         assert joint_ramp_time(0.0, -pure.angular_acceleration, limits) == pytest.approx(1.0, rel=1e-14)
 

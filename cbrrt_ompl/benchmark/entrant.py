@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from cbrrt_ompl.ompl_plugin.binding import ob, ou
 from cbrrt_ompl.ompl_plugin.compiled_planner import CompiledPlanner
 from cbrrt_ompl.ompl_plugin.setup import (
@@ -16,7 +15,6 @@ from cbrrt_ompl.ompl_plugin.setup import (
     first_solution_objective,
     make_planner,
 )
-from cbrrt_ompl.planners.growth import REFUSALS
 from cbrrt_ompl.planners.search import COMPILED_PLANNERS
 from cbrrt_ompl.scenario.scenario import Scenario
 
@@ -35,27 +33,26 @@ class Entrant(ob.Planner):  # type: ignore[misc]  # OMPL has no type information
         planning_time: time of the last search alone [s].
     """
 
-    def __init__(self, setup: Any, scenario: Scenario, name: str, clearance_map: ClearanceMap) -> None:
+    def __init__(self, setup: Any, scenario: Scenario, name: str) -> None:
         """Enter a planner.
 
         Args:
             setup: the ``SimpleSetup`` that all planners of the Benchmark share.
             scenario: world, robot, start, goal and settings.
             name: the planner's name.
-            clearance_map: of the scenario's world and footprint.
         """
         super().__init__(setup.getSpaceInformation(), name)
         self.time_limit = math.inf
         self.equipment: Equipment | None = None
         self.planner: Any = None
         self.planning_time = 0.0
-        self._setup, self._scenario, self._map = setup, scenario, clearance_map
+        self._setup, self._scenario = setup, scenario
         self._rounds = 0
 
     def equip(self) -> None:
         """Give the shared space information this planner's propagator and sampler, and take away all others."""
         space = self._setup.getStateSpace()
-        self.equipment = equip(self.getSpaceInformation(), space, self._scenario, self.getName(), self._map)
+        self.equipment = equip(self.getSpaceInformation(), space, self._scenario, self.getName())
         if self.getName() == "sst":
             self._setup.setOptimizationObjective(first_solution_objective(self.getSpaceInformation()))
 
@@ -82,8 +79,6 @@ class Entrant(ob.Planner):  # type: ignore[misc]  # OMPL has no type information
         began = time.perf_counter()
         end = began + self.time_limit
         inner = ob.PlannerTerminationCondition(ob.PlannerTerminationConditionFn(self._stop_condition(condition, end)))
-        if self.equipment is not None:
-            self.equipment.should_stop = lambda _: time.perf_counter() >= end
         status = self.planner.solve(inner)
         self.planning_time = time.perf_counter() - began
         return status
@@ -105,7 +100,7 @@ class Entrant(ob.Planner):  # type: ignore[misc]  # OMPL has no type information
     def extension_attempts(self) -> int:
         """Extensions that were driven: the samples of this run but those refused by line 5 of Algorithm II."""
         if isinstance(self.planner, CompiledPlanner):
-            return self.samples - int(self.planner.search.counters[REFUSALS]) if self.planner.search is not None else 0
+            return self.samples - self.planner.search.refusals if self.planner.search is not None else 0
         sampler = self.equipment.sampler if self.equipment is not None else None
         return self.samples - (0 if sampler is None else sampler.refused)
 
@@ -113,8 +108,8 @@ class Entrant(ob.Planner):  # type: ignore[misc]  # OMPL has no type information
         """A new planner."""
         si, name = self.getSpaceInformation(), self.getName()
         if name in COMPILED_PLANNERS:
-            return CompiledPlanner(si, self._scenario, name, self._map, seed)
-        return make_planner(si, self._scenario, name, self._map)
+            return CompiledPlanner(si, self._scenario, name, seed)
+        return make_planner(si, self._scenario, name)
 
     def _stop_condition(self, condition: Any, end: float) -> Callable[[], bool]:
         """OMPL's condition, the end of the time and, where OMPL does the sampling, the limit of samples."""

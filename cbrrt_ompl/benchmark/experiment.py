@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import math
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from cbrrt_ompl.benchmark.columns import search_columns, trajectory_columns
 from cbrrt_ompl.benchmark.entrant import Entrant
 from cbrrt_ompl.benchmark.log import Log, PlannerLog, read_log
-from cbrrt_ompl.collision.clearance_map import ClearanceMap, clearance_map_for
 from cbrrt_ompl.errors import InputError, Problem, SettingsError, UnknownPlannerError
 from cbrrt_ompl.motion.model import CLOSED_LOOP, law_of
 from cbrrt_ompl.ompl_plugin.binding import ot, ou
@@ -22,7 +18,6 @@ from cbrrt_ompl.ompl_plugin.results import trajectory_from_path
 from cbrrt_ompl.ompl_plugin.run import quiet_ompl
 from cbrrt_ompl.ompl_plugin.setup import make_equipped_setup
 from cbrrt_ompl.planning import PLANNERS, plan
-from cbrrt_ompl.problem.obstacles import Bounds
 from cbrrt_ompl.scenario.scenario import Scenario
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 
@@ -31,9 +26,6 @@ MEMORY_LIMIT = 4096.0
 
 WARM_UP = 0.01
 """Planning time of a run before the measured ones, so that none of them waits for the compiler [s]."""
-
-SURVEYED_POSES = 20_000
-"""Random poses that the clearance map has to decide before the measured runs."""
 
 PREFIX = "control_"
 """What OMPL's Benchmark puts before the names of control planners."""
@@ -66,12 +58,11 @@ class Experiment:
         """
         check_entries(scenario, seeds)
         self._scenario, self._seeds, self._name = scenario, seeds, name
-        clearance_map = clearance_map_for(scenario.world, scenario.robot.footprint)
         with quiet_ompl():
-            self._setup, _ = make_equipped_setup(scenario, next(iter(seeds)), clearance_map)
+            self._setup, _ = make_equipped_setup(scenario, next(iter(seeds)))
             self._setup.getSpaceInformation().clearDirectedSamplerAllocator()
             self._setup.setup()
-        self.entrants = {planner: Entrant(self._setup, scenario, planner, clearance_map) for planner in seeds}
+        self.entrants = {planner: Entrant(self._setup, scenario, planner) for planner in seeds}
         self._active = next(iter(self.entrants.values()))
         self._run = 0
         self._settings: dict[str, set[str]] = {}
@@ -87,7 +78,6 @@ class Experiment:
         Returns:
             OMPL's log, with settings and properties of the planners themselves instead of those of their entrants.
         """
-        survey(clearance_map_for(self._scenario.world, self._scenario.robot.footprint), self._scenario.world.bounds)
         for name in self.entrants:
             plan(self._scenario, name, seed=0, time_limit=WARM_UP)
         benchmark = ot.Benchmark(self._setup, self._name)
@@ -155,18 +145,6 @@ class Experiment:
     def _with_settings(self, planner: PlannerLog) -> PlannerLog:
         settings = {*planner.settings, *self._settings[planner.name.removeprefix(PREFIX)]}
         return replace(planner, settings=tuple(sorted(settings)))
-
-
-def survey(clearance_map: ClearanceMap, bounds: Bounds) -> None:
-    """Let a clearance map learn where the obstacles are, so that the first runs do not pay for all later ones.
-
-    Args:
-        clearance_map: the map.
-        bounds: of its world.
-    """
-    low, high = (*bounds.min, -math.pi), (*bounds.max, math.pi)
-    for x, y, theta in np.random.default_rng(0).uniform(low, high, (SURVEYED_POSES, 3)).tolist():
-        clearance_map.collides(x, y, theta)
 
 
 def check_entries(scenario: Scenario, seeds: Mapping[str, Sequence[int]]) -> None:

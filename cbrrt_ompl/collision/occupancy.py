@@ -9,12 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from cbrrt_ompl.checks import is_number
+from cbrrt_ompl.collision.pieces import Pieces, join, obstacle_pieces, rectangle_pieces
 from cbrrt_ompl.errors import MapError, Problem, Remark
 from cbrrt_ompl.problem.obstacles import MAX_COORDINATE, Bounds, Box, Obstacle, OrientedBox, Polygon
 
@@ -109,8 +112,7 @@ def blocked_cells(cells: NDArray[np.int8], unknown: str) -> NDArray[np.bool_]:
 def covering_rectangles(blocked: NDArray[np.bool_]) -> NDArray[np.int32]:
     """Few rectangles that cover the true cells of a grid and no other; they may overlap.
 
-    Row by row, the first cell not yet covered gets the largest rectangle that has it as a corner and lies above, which
-    then grows to all sides as far as it can.
+    Row by row, the first cell not yet covered gets the largest rectangle that has it as a corner and lies above.
 
     Args:
         blocked: shape (rows, columns).
@@ -128,30 +130,64 @@ def covering_rectangles(blocked: NDArray[np.bool_]) -> NDArray[np.int32]:
     return found[:count].copy()
 
 
-def grid_obstacles(
-    blocked: NDArray[np.bool_], resolution: float, origin: Sequence[float] = (0.0, 0.0, 0.0)
-) -> list[Obstacle]:
-    """Obstacles that cover the true cells of a grid, and what lies outside of it but inside its bounds.
+@dataclass(frozen=True, eq=False)
+class GridLayer:
+    """The obstacles of a grid: boxes that cover its true cells, and what lies outside of it but inside its bounds."""
 
-    Args:
-        blocked: shape (rows, columns).
-        resolution: side of a cell [m].
-        origin: pose (x, y, yaw) of the lower left corner of the grid, [m, m, rad].
+    blocked: NDArray[np.bool_]
+    """Cells that nobody may enter, shape (rows, columns)."""
+    resolution: float
+    """Side of a cell [m]."""
+    origin: tuple[float, float, float]
+    """Pose (x, y, yaw) of the lower left corner of the grid, [m, m, rad]."""
 
-    Returns:
-        Boxes where the grid lies along the axes; else oriented boxes and a triangle in each corner of the bounds.
-    """
-    check_frame(blocked.shape, resolution, origin)
-    rectangles = covering_rectangles(blocked).astype(np.float64) * float(resolution)  # (n, 4)
-    lows, highs = rectangles[:, 1::-1], rectangles[:, :1:-1]  # (n, 2), [m]
-    if _quarter_turns(origin[2]) is not None:
-        a, b = _in_world(lows, origin), _in_world(highs, origin)
-        corners = np.hstack([np.minimum(a, b), np.maximum(a, b)]).tolist()
-        return [Box((x0, y0), (x1, y1)) for x0, y0, x1, y1 in corners]
-    centers = _in_world(0.5 * (lows + highs), origin).tolist()
-    sizes, yaw = (highs - lows).tolist(), float(origin[2])
-    boxes = [OrientedBox((x, y), (w, h), yaw) for (x, y), (w, h) in zip(centers, sizes, strict=True)]
-    return [*boxes, *_outer_corners(blocked.shape, resolution, origin)]
+    def __post_init__(self) -> None:
+        """Check that the grid has a place in the world, and freeze it."""
+        check_frame(self.blocked.shape, self.resolution, self.origin)
+        blocked = np.array(self.blocked, dtype=np.bool_)
+        blocked.setflags(write=False)
+        x, y, yaw = (float(value) for value in self.origin)
+        object.__setattr__(self, "blocked", blocked)
+        object.__setattr__(self, "resolution", float(self.resolution))
+        object.__setattr__(self, "origin", (x, y, yaw))
+
+    @property
+    def bounds(self) -> Bounds:
+        """Smallest bounds that hold the grid."""
+        return grid_bounds(self.blocked.shape, self.resolution, self.origin)
+
+    @cached_property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """Boxes where the grid lies along the axes; else oriented boxes and a triangle in each corner of the bounds."""
+        lows, highs = self._rectangles
+        if _quarter_turns(self.origin[2]) is not None:
+            return tuple(
+                Box((x0, y0), (x1, y1)) for (x0, y0), (x1, y1) in zip(lows.tolist(), highs.tolist(), strict=True)
+            )
+        centers, sizes, yaw = 0.5 * (lows + highs), (highs - lows).tolist(), self.origin[2]
+        placed = _in_world(centers, self.origin).tolist()
+        boxes = [OrientedBox((x, y), (w, h), yaw) for (x, y), (w, h) in zip(placed, sizes, strict=True)]
+        return *boxes, *_outer_corners(self.blocked.shape, self.resolution, self.origin)
+
+    @cached_property
+    def pieces(self) -> Pieces:
+        """The convex pieces of the obstacles, made without them."""
+        lows, highs = self._rectangles
+        if _quarter_turns(self.origin[2]) is not None:
+            return rectangle_pieces(0.5 * (lows + highs), highs - lows)
+        rectangles = rectangle_pieces(_in_world(0.5 * (lows + highs), self.origin), highs - lows, self.origin[2])
+        corners = obstacle_pieces(_outer_corners(self.blocked.shape, self.resolution, self.origin))
+        return join((rectangles, corners))
+
+    @cached_property
+    def _rectangles(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Lower left and upper right corners, each of shape (n, 2) [m]: in the world, or in a tilted grid."""
+        rectangles = covering_rectangles(self.blocked).astype(np.float64) * self.resolution  # (n, 4)
+        lows, highs = rectangles[:, 1::-1], rectangles[:, :1:-1]
+        if _quarter_turns(self.origin[2]) is None:
+            return lows, highs
+        a, b = _in_world(lows, self.origin), _in_world(highs, self.origin)
+        return np.minimum(a, b), np.maximum(a, b)
 
 
 def grid_bounds(shape: tuple[int, ...], resolution: float, origin: Sequence[float] = (0.0, 0.0, 0.0)) -> Bounds:
@@ -286,18 +322,11 @@ def _cover(
             if not blocked[r, c] or covered[r, c]:
                 continue
             height, width = _largest_above(along_row, along_column, r, c)
-            bottom, left, right = r, c, c + width
-            while left > 0 and along_column[r, left - 1] >= height:
-                left -= 1
-            while right < columns and along_column[r, right] >= height:
-                right += 1
-            while bottom > 0 and along_row[bottom - 1, left] >= right - left:
-                bottom -= 1
             for row in range(r, r + height):  # all rows below are covered already
-                for column in range(left, right):
+                for column in range(c, c + width):
                     covered[row, column] = True
             if n < len(found):
-                found[n, 0], found[n, 1], found[n, 2], found[n, 3] = bottom, left, r + height, right
+                found[n, 0], found[n, 1], found[n, 2], found[n, 3] = r, c, r + height, c + width
             n += 1
     return n
 

@@ -8,10 +8,8 @@ from itertools import compress
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.collision.clearance_map import ClearanceMap, clearance_map_for, extend_map
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.problem.obstacles import Obstacle, bounding_box, distance_from_box, signed_distance
-from cbrrt_ompl.problem.robot import Footprint
 
 
 class Knowledge:
@@ -24,24 +22,17 @@ class Knowledge:
         hidden: the obstacles not seen yet.
     """
 
-    def __init__(self, world: World, hidden: Sequence[Obstacle], footprint: Footprint) -> None:
+    def __init__(self, world: World, hidden: Sequence[Obstacle]) -> None:
         """Start with what is known beforehand.
 
         Args:
             world: bounds and known obstacles.
             hidden: obstacles to be found.
-            footprint: the robot's area, for which clearances are kept.
         """
         self.world = world
         self.hidden = list(hidden)
-        self._footprint = footprint
         boxes = [bounding_box(obstacle) for obstacle in hidden]
         self._boxes: NDArray[np.float64] = np.array(boxes, dtype=np.float64).reshape(-1, 4)
-
-    @property
-    def clearance_map(self) -> ClearanceMap:
-        """The clearances of the known world."""
-        return clearance_map_for(self.world, self._footprint)
 
     def look(self, x: float, y: float, sensor_range: float) -> list[Obstacle]:
         """See what is within range, and learn it.
@@ -62,6 +53,5 @@ class Knowledge:
         if seen:
             self.hidden = list(compress(self.hidden, ~is_seen))
             self._boxes = self._boxes[~is_seen]
-            before, self.world = self.world, World(self.world.bounds, (*self.world.obstacles, *seen))
-            extend_map(before, self.world, self._footprint)
+            self.world = self.world.with_more(seen)
         return seen

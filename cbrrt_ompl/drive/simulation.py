@@ -17,7 +17,6 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.collision.clearance_map import clearance_map_for
 from cbrrt_ompl.collision.motion_check import is_free
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.drive.knowledge import Knowledge
@@ -73,12 +72,12 @@ class Drive:
         known = World(scenario.world.bounds) if hidden is None else scenario.world
         self.hidden = tuple(scenario.world.obstacles if hidden is None else hidden)
         self.scenario = replace(scenario, world=known)
-        self.world = World(known.bounds, (*known.obstacles, *self.hidden)) if hidden else scenario.world
+        self.world = known.with_more(self.hidden) if hidden else scenario.world
         self._dt, self._cycle_steps = scenario.planning.step, self.settings.steps(scenario.planning)
         _check_range(scenario, self.settings)
         self._robot = replace(scenario.robot, footprint=grown(scenario.robot.footprint, self.settings.margin))
         self._planning = self.settings.planning(scenario.planning)
-        self._knowledge = Knowledge(known, self.hidden, self._robot.footprint)
+        self._knowledge = Knowledge(known, self.hidden)
         self._rng = np.random.default_rng(seed)
         self._driven, self._steps_driven = [_at_start(scenario.start)], 0
         self._plan: Trajectory | None = None  # the rest of it from now on; None while braking
@@ -87,7 +86,7 @@ class Drive:
         self.status = None if scenario.goal.violations(scenario.start) else REACHED
         self.cycles: list[Cycle] = []
         warm_up_planner(self.settings.planner)
-        if not is_free(self._committed.states, self._dt, clearance_map_for(self.world, self._robot.footprint)):
+        if not is_free(self._committed.states, self._dt, self.world.scene(self._robot.footprint)):
             expected = f"a state with {self.settings.margin:g} m of room (the margin), on the way to rest as well"
             raise ScenarioError(Problem("start", list(scenario.start), expected))
 
@@ -211,7 +210,7 @@ class Drive:
 
     def _is_free(self, motion: Trajectory) -> bool:
         """Whether a motion is free in all that is known."""
-        return is_free(motion.states, self._dt, self._knowledge.clearance_map)
+        return is_free(motion.states, self._dt, self._knowledge.world.scene(self._robot.footprint))
 
 
 def drive(

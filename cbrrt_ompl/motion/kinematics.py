@@ -93,10 +93,20 @@ def saturate(v: float, omega: float, limits: Limits) -> tuple[float, float]:
 
 
 @njit(cache=True)
-def pure_limits(limits: Limits) -> Limits:
+def axis_limits(limits: Limits) -> Limits:
     """Limits that hold for driving straight on and for turning on the spot, those of the wheels included."""
     if not has_wheel_limits(limits):
-        return limits
+        return Limits(
+            limits.v_min,
+            limits.v_max,
+            limits.omega_min,
+            limits.omega_max,
+            limits.acceleration,
+            limits.angular_acceleration,
+            limits.wheel_separation,
+            limits.wheel_speed,
+            limits.wheel_acceleration,
+        )
     arm = 0.5 * limits.wheel_separation
     v_top, omega_top = limits.wheel_speed, INSIDE * limits.wheel_speed / arm
     return Limits(
@@ -124,6 +134,12 @@ def joint_ramp_time(dv: float, domega: float, limits: Limits) -> float:
 def stopping_time(v: float, omega: float, limits: Limits) -> float:
     """Time in which a robot that brakes no longer drives, though it may still turn [s]."""
     return joint_ramp_time(v, omega, limits) if has_wheel_limits(limits) else abs(v) / limits.acceleration
+
+
+@njit(cache=True)
+def stopping_time_of_turn(v: float, omega: float, limits: Limits) -> float:
+    """Time in which a robot that brakes no longer turns, though it may still drive [s]."""
+    return joint_ramp_time(v, omega, limits) if has_wheel_limits(limits) else abs(omega) / limits.angular_acceleration
 
 
 @njit(cache=True)

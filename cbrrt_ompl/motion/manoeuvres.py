@@ -11,7 +11,7 @@ import math
 
 from numba import njit
 
-from cbrrt_ompl.motion.kinematics import clamp, pure_limits, wrap_angle
+from cbrrt_ompl.motion.kinematics import axis_limits, clamp, wrap_angle
 from cbrrt_ompl.problem.robot import Limits
 
 FORWARD, REVERSE, BRAKE = 8.0, 9.0, 10.0
@@ -85,7 +85,7 @@ def approach_command(
         (v, omega), in reach within the step, [m/s, rad/s].
     """
     x, y, theta, v, omega = state
-    limits = pure_limits(limits)
+    limits = axis_limits(limits)
     dx, dy = aim[0] - x, aim[1] - y
     c, s = math.cos(theta), math.sin(theta)
     along, aside = c * dx + s * dy, c * dy - s * dx
@@ -132,7 +132,7 @@ def has_ended(
 @njit(cache=True)
 def most_steps(manoeuvre: float, distance: float, limits: Limits, dt: float) -> int:
     """Steps within which every manoeuvre has ended, an approach over a distance [m] at its start."""
-    limits = pure_limits(limits)
+    limits = axis_limits(limits)
     v_range, omega_range = limits.v_max - limits.v_min, limits.omega_max - limits.omega_min
     stop = v_range / limits.acceleration + omega_range / limits.angular_acceleration
     if manoeuvre == BRAKE:

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from cbrrt_ompl.errors import Problem, SettingsError
 from cbrrt_ompl.motion.control_laws import steering_rate, tracking_command
 from cbrrt_ompl.motion.kinematics import dynamic_step, kinematic_step, saturate
 from cbrrt_ompl.motion.manoeuvres import BRAKE, REVERSE, approach_command, has_ended, is_manoeuvre
+from cbrrt_ompl.motion.records import Record, Records, record_array
 from cbrrt_ompl.problem.robot import Gains, Limits, Robot
-from cbrrt_ompl.problem.settings import Goal, PlanningSettings
+from cbrrt_ompl.problem.settings import Goal, PlanningSettings, goal_distance, heading_error
 
 OPEN_LOOP, CLOSED_LOOP, STEERING = 0, 1, 2
 """How an extension is driven: Kanayama law once an extension or at every step (CB-RRT), or at full speed (S-RRT)."""
+
+ROOM = 5e-4
+"""Distance that planned motions keep from everything at least [m]; poses by themselves only have to be free."""
+
+CLEARANCE_DIP = 1e-5
+"""What points of a motion keep more than a clearance that is asked for, see :func:`motion_room` [m]."""
 
 MAX_TURN_PER_STEP = 0.5
 """Largest turn in one integration step [rad]: the error of a step then stays below 1e-5 of its length."""
@@ -30,47 +35,47 @@ CANDIDATES = 3
 """Extensions tried for one sample at most: the three steering rates of S-RRT."""
 
 
-class GoalRegion(NamedTuple):
-    """The goal as the kernels see it; infinite tolerances leave a condition out."""
+LIMITS = np.dtype([(name, np.float64) for name in Limits._fields], align=True)
+"""The fields of :class:`cbrrt_ompl.problem.robot.Limits`."""
 
-    x: float
-    y: float
-    tolerance: float
-    theta: float
-    heading_tolerance: float
-    speed_tolerance: float
+GAINS = np.dtype([(name, np.float64) for name in Gains._fields], align=True)
+"""The fields of :class:`cbrrt_ompl.problem.robot.Gains`."""
+
+GOAL_REGION = np.dtype(
+    [
+        ("x", np.float64),  # centre [m]
+        ("y", np.float64),
+        ("tolerance", np.float64),  # radius [m]
+        ("theta", np.float64),  # heading [rad]
+        ("heading_tolerance", np.float64),  # infinite where the heading is free [rad]
+        ("speed_tolerance", np.float64),  # infinite where the speeds are free [m/s and rad/s]
+    ],
+    align=True,
+)
+"""The goal as the kernels see it."""
+
+MODEL = np.dtype(
+    [
+        ("law", np.int64),  # OPEN_LOOP, CLOSED_LOOP or STEERING
+        ("dt", np.float64),  # integration step [s]
+        ("steps", np.int64),  # of a whole extension
+        ("look_ahead", np.float64),  # largest distance of the reference from its node [m]
+        ("equal_control_tolerance", np.float64),  # eps_u of Algorithm II, line 5 [m/s and rad/s]
+        ("room", np.float64),  # distance that every point of a motion keeps from everything [m]
+        ("keep_cut", np.bool_),  # whether the free part of an extension that meets an obstacle is kept
+        ("approaches", np.bool_),  # whether a final approach to the goal is tried from every node
+        ("brake_safe", np.bool_),  # whether the robot must be able to brake to rest from every state
+        ("limits", LIMITS),
+        ("gains", GAINS),
+        ("goal", GOAL_REGION),
+    ],
+    align=True,
+)
+"""All that an extension depends on besides node, sample and world."""
 
 
-class Model(NamedTuple):
-    """All that an extension depends on besides node, sample and world."""
-
-    law: int
-    """`OPEN_LOOP`, `CLOSED_LOOP` or `STEERING`."""
-    dt: float
-    """Integration step [s]."""
-    steps: int
-    """Steps of a whole extension."""
-    look_ahead: float
-    """Largest distance of the reference from its node [m]."""
-    equal_control_tolerance: float
-    """eps_u of line 5 [m/s and rad/s]."""
-    keep_cut: bool
-    """Whether the free part of an extension that meets an obstacle is kept."""
-    approaches: bool
-    """Whether a final approach to the goal is tried from every node."""
-    brake_safe: bool
-    """Whether the robot must be able to brake to rest from every state."""
-    limits: Limits
-    gains: Gains
-    goal: GoalRegion
-
-
-MODEL_SIZE = 8 + len(Limits._fields) + len(Gains._fields) + len(GoalRegion._fields)
-"""Numbers in a packed model."""
-
-
-def pack_model(law: int, robot: Robot, goal: Goal, planning: PlanningSettings) -> NDArray[np.float64]:
-    """The model as one flat array: what a kernel takes from Python at the least cost.
+def make_model(law: int, robot: Robot, goal: Goal, planning: PlanningSettings) -> Records:
+    """The model that kernels read.
 
     Args:
         law: `OPEN_LOOP`, `CLOSED_LOOP` or `STEERING`.
@@ -79,9 +84,17 @@ def pack_model(law: int, robot: Robot, goal: Goal, planning: PlanningSettings) -
         planning: settings.
 
     Returns:
-        The numbers that :func:`unpack_model` reads, shape (MODEL_SIZE,).
+        One record of type `MODEL`, shape (1,): an array, since numba takes one from Python at the least cost.
     """
-    region = GoalRegion(
+    model = record_array(1, MODEL)
+    model["law"], model["dt"], model["steps"] = law, planning.step, planning.steps
+    model["look_ahead"] = planning.reference_distance(robot.limits)
+    model["equal_control_tolerance"] = planning.equal_control_tolerance
+    model["room"] = motion_room(planning.clearance)
+    model["keep_cut"] = planning.cut_extension == "keep"
+    model["approaches"], model["brake_safe"] = planning.approaches(goal), planning.brake_safe
+    model["limits"], model["gains"] = tuple(robot.limits), tuple(robot.gains)
+    model["goal"] = (
         goal.x,
         goal.y,
         goal.tolerance,
@@ -89,40 +102,21 @@ def pack_model(law: int, robot: Robot, goal: Goal, planning: PlanningSettings) -
         math.inf if goal.theta is None else goal.heading_tolerance,
         math.inf if goal.speed_tolerance is None else goal.speed_tolerance,
     )
-    head = (
-        law,
-        planning.step,
-        planning.steps,
-        planning.reference_distance(robot.limits),
-        planning.equal_control_tolerance,
-        planning.cut_extension == "keep",
-        planning.approaches(goal),
-        planning.brake_safe,
-    )
-    return np.array([*head, *robot.limits, *robot.gains, *region], dtype=float)
+    return model
 
 
-@njit(cache=True)
-def unpack_model(p: NDArray[np.float64]) -> Model:
-    """The model out of its flat array, shape (MODEL_SIZE,)."""
-    return Model(
-        int(p[0]),
-        p[1],
-        int(p[2]),
-        p[3],
-        p[4],
-        p[5] != 0.0,
-        p[6] != 0.0,
-        p[7] != 0.0,
-        Limits(p[8], p[9], p[10], p[11], p[12], p[13], p[14], p[15], p[16]),
-        Gains(p[17], p[18], p[19]),
-        GoalRegion(p[20], p[21], p[22], p[23], p[24], p[25]),
-    )
+def motion_room(clearance: float) -> float:
+    """Distance that the checked points of a motion keep, for a clearance that all of it is to have [m].
+
+    Points a millimetre apart are checked. Between two of them a motion may come nearer by some micrometres where it
+    passes a corner: `CLEARANCE_DIP` is more than that for any clearance above `ROOM`.
+    """
+    return ROOM if clearance <= ROOM - CLEARANCE_DIP else clearance + CLEARANCE_DIP
 
 
-def control_dimension(model: NDArray[np.float64]) -> int:
-    """Numbers of OMPL's controls under a packed model: (v, omega), a reference pose, or room for a manoeuvre's mark."""
-    return 3 if int(model[0]) == CLOSED_LOOP or model[6] else 2
+def control_dimension(model: Records) -> int:
+    """Numbers of OMPL's controls under a model: (v, omega), a reference pose, or room for a manoeuvre's mark."""
+    return 3 if model["law"][0] == CLOSED_LOOP or model["approaches"][0] else 2
 
 
 def law_of(planner: str, planning: PlanningSettings) -> int:
@@ -147,16 +141,16 @@ def check_step(robot: Robot, planning: PlanningSettings) -> None:
         raise SettingsError(Problem("planning.step", planning.step, expected))
 
 
+_goal_distance, _heading_error = njit(cache=True)(goal_distance), njit(cache=True)(heading_error)
+
+
 @njit(cache=True)
-def in_goal(goal: GoalRegion, x: float, y: float, theta: float, v: float, omega: float) -> bool:
-    """Whether a state satisfies the goal; the distance is compared as OMPL's GoalState does, bit for bit."""
-    dx, dy = x - goal.x, y - goal.y
-    if not math.sqrt(dx * dx + dy * dy) < goal.tolerance:
+def in_goal(goal: Record, x: float, y: float, theta: float, v: float, omega: float) -> bool:
+    """Whether a state satisfies the goal, a record of type `GOAL_REGION`."""
+    if not _goal_distance(goal, x, y) < goal.tolerance:
         return False
-    if goal.heading_tolerance < math.inf:
-        error = abs(theta - goal.theta) % (2.0 * math.pi)
-        if min(error, 2.0 * math.pi - error) > goal.heading_tolerance:
-            return False
+    if goal.heading_tolerance < math.inf and _heading_error(goal, theta) > goal.heading_tolerance:
+        return False
     return abs(v) <= goal.speed_tolerance and abs(omega) <= goal.speed_tolerance
 
 
@@ -168,7 +162,7 @@ def advance(
     v: float,
     omega: float,
     control: tuple[float, float, float],
-    model: Model,
+    model: Record,
     dt: float,
 ) -> tuple[float, float, float, float, float, float, float]:
     """One integration step under a control.
@@ -181,7 +175,7 @@ def advance(
         omega: turning rate [rad/s].
         control: command (v, omega, unused), or the reference pose (x_r, y_r, theta_r) where the law is `CLOSED_LOOP`;
             or a manoeuvre, by its third number.
-        model: how the robot moves.
+        model: how the robot moves, a record of type `MODEL`.
         dt: duration of the step [s].
 
     Returns:
@@ -206,7 +200,7 @@ def candidate(
     index: int,
     node: tuple[float, float, float, float, float],
     reference: tuple[float, float, float],
-    model: Model,
+    model: Record,
 ) -> tuple[float, float, tuple[float, float, float]]:
     """A command worth trying from a node, and the control that carries it out.
 
@@ -214,7 +208,7 @@ def candidate(
         index: 0 for CB-RRT; 0, 1, 2 for the steering rates of S-RRT.
         node: (x, y, theta, v, omega) of the node.
         reference: pose to drive to, [m, m, rad].
-        model: how the robot moves.
+        model: how the robot moves, a record of type `MODEL`.
 
     Returns:
         The command (v, omega) that line 5 compares, and the control for :func:`advance`.
@@ -230,7 +224,7 @@ def candidate(
 
 @njit(cache=True)
 def manoeuvre_command(
-    state: tuple[float, float, float, float, float], manoeuvre: float, model: Model
+    state: tuple[float, float, float, float, float], manoeuvre: float, model: Record
 ) -> tuple[float, float]:
     """Command (v, omega) of the next step of a manoeuvre, [m/s, rad/s]."""
     if manoeuvre == BRAKE:
@@ -248,14 +242,14 @@ def manoeuvre_command(
 
 
 @njit(cache=True)
-def manoeuvre_has_ended(manoeuvre: float, state: tuple[float, float, float, float, float], goal: GoalRegion) -> bool:
+def manoeuvre_has_ended(manoeuvre: float, state: tuple[float, float, float, float, float], goal: Record) -> bool:
     """Whether a manoeuvre is over, see :func:`cbrrt_ompl.motion.manoeuvres.has_ended`."""
     return has_ended(manoeuvre, state, (goal.x, goal.y, goal.theta), goal.heading_tolerance < math.inf)
 
 
 @njit(cache=True)
 def has_come_to_end(
-    state: tuple[float, float, float, float, float], control: tuple[float, float, float], model: Model
+    state: tuple[float, float, float, float, float], control: tuple[float, float, float], model: Record
 ) -> bool:
     """Whether a roll-out ends at a state before its last step: in the goal region, or with its manoeuvre."""
     if is_manoeuvre(control):

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.collision.clearance_map import ClearanceMap
-from cbrrt_ompl.motion.model import law_of, pack_model
+from cbrrt_ompl.motion.model import law_of, make_model
 from cbrrt_ompl.ompl_plugin.binding import ob, oc
 from cbrrt_ompl.ompl_plugin.reals import StateReals
 from cbrrt_ompl.ompl_plugin.space import STATE_DIMENSION, set_state
@@ -28,23 +27,19 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
         search: the search of the present tree; None before the first ``solve``.
     """
 
-    def __init__(
-        self, si: Any, scenario: Scenario, name: str, clearance_map: ClearanceMap, seed: int | None = None
-    ) -> None:
+    def __init__(self, si: Any, scenario: Scenario, name: str, seed: int | None = None) -> None:
         """Take over the scenario.
 
         Args:
             si: the space information of the problem.
             scenario: robot, goal and settings.
             name: `cb-rrt-compiled`, `cb-rrt-robust` or `s-rrt-compiled`.
-            clearance_map: decides the states.
             seed: of the first tree; the next ones go on from there. None draws a fresh one.
         """
         super().__init__(si, name)
         self.search: Search | None = None
         self._scenario = scenario
-        self._map = clearance_map
-        self._model = pack_model(law_of(name, scenario.planning), scenario.robot, scenario.goal, scenario.planning)
+        self._model = make_model(law_of(name, scenario.planning), scenario.robot, scenario.goal, scenario.planning)
         self._is_robust = name == ROBUST
         self._seed = seed
 
@@ -70,7 +65,8 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
             planning = self._scenario.planning
             self.search = Search(
                 self._model,
-                self._map,
+                self._scenario.world,
+                self._scenario.robot.footprint,
                 starts,
                 self._seed,
                 goal_bias=planning.goal_bias,
@@ -97,7 +93,7 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
                 continue
             data.addVertex(vertex)
             if data.hasControls():
-                duration = float(steps[node] * self._model[1])
+                duration = float(steps[node] * self._model["dt"][0])
                 data.addEdge(parent, node, oc.PlannerDataEdgeControl(edges[node], duration))
             else:
                 data.addEdge(parent, node)
@@ -117,7 +113,7 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
         path.append(state())
         for node in nodes[1:]:
             state, control = self._state(states[node]), self._control(controls[node])
-            path.append(state(), control, float(steps[node] * self._model[1]))
+            path.append(state(), control, float(steps[node] * self._model["dt"][0]))
             self.getSpaceInformation().getControlSpace().freeControl(control)
         return path
 

@@ -8,7 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cbrrt_ompl.motion.model import advance, control_dimension, unpack_model
+from cbrrt_ompl.motion.model import advance, control_dimension
+from cbrrt_ompl.motion.records import Records
 from cbrrt_ompl.ompl_plugin.binding import oc
 from cbrrt_ompl.ompl_plugin.reals import StateReals
 from cbrrt_ompl.ompl_plugin.space import STATE_DIMENSION
@@ -25,13 +26,13 @@ class TwoWheelPropagator(oc.StatePropagator):  # type: ignore[misc]  # OMPL has 
     at. OMPL calls this once an integration step.
     """
 
-    def __init__(self, si: Any, space: Any, model: NDArray[np.float64]) -> None:
+    def __init__(self, si: Any, space: Any, model: Records) -> None:
         """Make the buffer.
 
         Args:
             si: the space information that will own this propagator.
             space: its state space.
-            model: packed model, see :func:`cbrrt_ompl.motion.model.pack_model`.
+            model: see :func:`cbrrt_ompl.motion.model.make_model`.
         """
         super().__init__(si)
         self._reals = StateReals(space, STATE_DIMENSION)
@@ -42,7 +43,7 @@ class TwoWheelPropagator(oc.StatePropagator):  # type: ignore[misc]  # OMPL has 
         """Write the state that ``control`` leads to after ``duration`` [s]."""
         self._reals.read(state)
         third = control[2] if self._has_third else 0.0
-        advance_packed(self._reals.values, control[0], control[1], third, self._model, duration)
+        advance_values(self._reals.values, control[0], control[1], third, self._model, duration)
         self._reals.write(result)
 
     def canPropagateBackward(self) -> bool:  # noqa: N802  # OMPL's name
@@ -51,10 +52,8 @@ class TwoWheelPropagator(oc.StatePropagator):  # type: ignore[misc]  # OMPL has 
 
 
 @njit(cache=True)
-def advance_packed(
-    values: NDArray[np.float64], c0: float, c1: float, c2: float, model: NDArray[np.float64], dt: float
-) -> None:
+def advance_values(values: NDArray[np.float64], c0: float, c1: float, c2: float, models: Records, dt: float) -> None:
     """:func:`cbrrt_ompl.motion.model.advance` in place, for a caller in Python; values of shape (5,)."""
-    m = unpack_model(model)
-    x, y, theta, v, omega, _, _ = advance(values[0], values[1], values[2], values[3], values[4], (c0, c1, c2), m, dt)
+    x, y, theta, v, omega = values[0], values[1], values[2], values[3], values[4]
+    x, y, theta, v, omega, _, _ = advance(x, y, theta, v, omega, (c0, c1, c2), models[0], dt)
     values[0], values[1], values[2], values[3], values[4] = x, y, theta, v, omega

@@ -8,35 +8,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cbrrt_ompl.motion.model import control_dimension
+from cbrrt_ompl.motion.records import Records
 from cbrrt_ompl.ompl_plugin.binding import oc, ou
 from cbrrt_ompl.trajectory.replay import trajectory_from_controls, tree_from_controls
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.trajectory.tree import Tree
 
 
-def trajectory_from_path(path: Any, space: Any, model: NDArray[np.float64]) -> Trajectory:
+def trajectory_from_path(path: Any, space: Any, model: Records) -> Trajectory:
     """A control path, replayed on the integration grid.
 
     Args:
         path: an ``ompl.control.PathControl`` of at least one state.
         space: its state space.
-        model: packed model that its controls were made for.
+        model: model that its controls were made for.
     """
     count = path.getControlCount()
     controls = np.array([_control(path.getControl(i), model) for i in range(count)]).reshape(count, 3)
     durations = np.array([path.getControlDuration(i) for i in range(count)])
-    steps = np.rint(durations / model[1]).astype(np.int64)
+    steps = np.rint(durations / model["dt"][0]).astype(np.int64)
     return trajectory_from_controls(_reals(space, path.getState(0)), controls, steps, model)
 
 
-def tree_from_planner(planner: Any, si: Any, space: Any, model: NDArray[np.float64]) -> Tree:
+def tree_from_planner(planner: Any, si: Any, space: Any, model: Records) -> Tree:
     """The tree that a planner holds, with the way along every edge.
 
     Args:
         planner: a planner of OMPL after ``solve``.
         si: its space information.
         space: its state space.
-        model: packed model that its controls were made for.
+        model: model that its controls were made for.
     """
     data = oc.PlannerData(si)
     planner.getPlannerData(data)
@@ -52,7 +53,7 @@ def tree_from_planner(planner: Any, si: Any, space: Any, model: NDArray[np.float
             parents[child] = parent
             if edge.getControl() is not None:  # PDST gives none for edges that it has split
                 controls[child] = _control(edge.getControl(), model)
-                steps[child] = round(edge.getDuration() / model[1])
+                steps[child] = round(edge.getDuration() / model["dt"][0])
     return tree_from_controls(states, parents, controls, steps, model)
 
 
@@ -62,5 +63,5 @@ def _reals(space: Any, state: Any) -> NDArray[np.float64]:
     return np.array(list(reals))  # (5,)
 
 
-def _control(control: Any, model: NDArray[np.float64]) -> tuple[float, float, float]:
+def _control(control: Any, model: Records) -> tuple[float, float, float]:
     return control[0], control[1], control[2] if control_dimension(model) == 3 else 0.0

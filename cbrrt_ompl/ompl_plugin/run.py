@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
-from cbrrt_ompl.collision.clearance_map import ClearanceMap, clearance_map_for
 from cbrrt_ompl.ompl_plugin.binding import ob, ou
 from cbrrt_ompl.ompl_plugin.results import trajectory_from_path, tree_from_planner
 from cbrrt_ompl.ompl_plugin.setup import Equipment, make_equipped_setup
@@ -42,7 +41,6 @@ def run(
     seed: int | None,
     on_start: Callable[[], None],
     should_stop: Callable[[int], bool],
-    clearance_map: ClearanceMap | None = None,
     on_equipped: Callable[[Equipment], None] = lambda _: None,
     prepare: Callable[[Any], None] = lambda _: None,
 ) -> Found:
@@ -53,17 +51,14 @@ def run(
         planner: a name that :func:`cbrrt_ompl.ompl_plugin.setup.make_setup` knows.
         seed: 0 or more, or None for a fresh one.
         on_start: called when the search begins.
-        should_stop: called once a round of the planner's main loop, with the rounds so far, and within long extensions.
-        clearance_map: of the scenario's world and footprint; None takes the one that goes with the world.
+        should_stop: called once a round of the planner's main loop, with the rounds so far.
         on_equipped: takes what the planner was given.
         prepare: takes the ``SimpleSetup`` before it is set up, to change it.
     """
     with _ompl, quiet_ompl():
         # OMPL complains about a second seed in a process; yet all that is random below is allocated from here on
         ou.RNG.setSeed(1 + (secrets.randbits(31) if seed is None else int(seed)))
-        clearance_map = clearance_map or clearance_map_for(scenario.world, scenario.robot.footprint)
-        setup, equipment = make_equipped_setup(scenario, planner, clearance_map)
-        equipment.should_stop = should_stop
+        setup, equipment = make_equipped_setup(scenario, planner)
         on_equipped(equipment)
         prepare(setup)
         setup.setup()

@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cbrrt_ompl.collision.clearance_map import ClearanceMap, unpack_view
-from cbrrt_ompl.collision.motion_check import ASK
-from cbrrt_ompl.motion.model import control_dimension, unpack_model
+from cbrrt_ompl.collision.scene import Scene
+from cbrrt_ompl.motion.model import control_dimension
+from cbrrt_ompl.motion.records import Records, record_array
 from cbrrt_ompl.ompl_plugin.binding import oc
 from cbrrt_ompl.ompl_plugin.reals import StateReals
 from cbrrt_ompl.ompl_plugin.space import STATE_DIMENSION
-from cbrrt_ompl.planners.extension import EXTENDED, NO_CHILD, REFUSED, UNTRIED, extend
-from cbrrt_ompl.planners.roll_out import SCRATCH_SHAPE
+from cbrrt_ompl.planners.extension import CHILD, EXTENDED, NO_CHILD, REFUSED, UNTRIED, extend
+from cbrrt_ompl.planners.roll_out import STEPS, margin_at
+
+EXTENSION = np.dtype(
+    [
+        ("steps", np.int64),  # integration steps
+        ("v_command", np.float64),  # that line 5 compares [m/s, rad/s]
+        ("omega_command", np.float64),
+        ("control", np.float64, (3,)),  # see advance of the model
+        ("block", STEPS),  # room for the kernel
+    ],
+    align=True,
+)
+"""What a kernel hands to a sampler in Python."""
 
 
 class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL has no type information
@@ -28,33 +39,29 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
     first state in the goal region. OMPL makes one sampler a tree, so the sampler remembers the children of its nodes.
 
     Attributes:
-        should_stop: asked with the samples so far whenever FCL has to be; an extension that it ends adds nothing.
         samples: calls so far.
         refused: calls refused by line 5 of Algorithm II.
         children: nodes made so far.
     """
 
-    def __init__(self, si: Any, space: Any, model: NDArray[np.float64], clearance_map: ClearanceMap) -> None:
+    def __init__(self, si: Any, space: Any, model: Records, scene: Scene) -> None:
         """Make the buffers.
 
         Args:
             si: the space information that allocates this sampler.
             space: its state space. (References to ``si`` itself would make a cycle that Python cannot see.)
-            model: packed model, see :func:`cbrrt_ompl.motion.model.pack_model`.
-            clearance_map: decides the states.
+            model: see :func:`cbrrt_ompl.motion.model.make_model`.
+            scene: world and footprint, see :meth:`cbrrt_ompl.World.scene`.
         """
         super().__init__(si)
-        self.should_stop: Callable[[int], bool] = lambda _: False
         self.samples = 0
         self.refused = 0
         self._node, self._sample = StateReals(space, STATE_DIMENSION), StateReals(space, STATE_DIMENSION)
-        self._model, self._map = model, clearance_map
+        self._model, self._scene = model, scene
         self._control_dimension = control_dimension(model)
-        self._outcome = np.empty(OUTCOME_SIZE)
-        self._scratch = np.empty(SCRATCH_SHAPE)
+        self._extension = record_array(1, EXTENSION)
         self._first_child: dict[bytes, int] = {}
-        self._following: NDArray[np.int32] = np.empty(64, dtype=np.int32)
-        self._commands: NDArray[np.float64] = np.empty((64, 2))
+        self._children = record_array(64, CHILD)
         self.children = 0
 
     def sampleTo(self, control: Any, *states: Any) -> int:  # noqa: N802  # OMPL's name
@@ -64,58 +71,36 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         self._node.read(source)
         self._sample.read(dest)
         node = self._node.values.tobytes()
-        first = self._first_child.setdefault(node, UNTRIED)
-        self._map.forget_findings()
-        status = self._extend(first)
-        if status == ASK:
-            status = self._ask_and_extend(first)
-        if first == UNTRIED:
-            self._first_child[node] = NO_CHILD
-        if status != EXTENDED:
-            self.refused += status == REFUSED
-            return 0
-        outcome = self._outcome.tolist()
-        self._remember(node, outcome[1], outcome[2])
-        for i in range(self._control_dimension):
-            control[i] = outcome[3 + i]
-        self._sample.write(dest)
-        return int(outcome[0])
-
-    def _extend(self, first: int) -> int:
-        """Run the kernel on the present node and sample."""
-        m = self._map
-        return extend_packed(
+        first_child = self._first_child.setdefault(node, UNTRIED)
+        outcome = extend_values(
             self._node.values,
             self._sample.values,
-            first,
-            self._following,
-            self._commands,
+            first_child,
+            self._children,
+            *self._scene,
             self._model,
-            m.children,
-            m.clearances,
-            m.frame,
-            m.findings,
-            self._outcome,
-            self._scratch,
+            self._extension,
         )
-
-    def _ask_and_extend(self, first: int) -> int:
-        """Answer the kernel's questions by FCL until it has none, or the search is to stop."""
-        status = ASK
-        while status == ASK and not self.should_stop(self.samples):
-            x, y, theta = self._outcome[3:6].tolist()
-            self._map.answer(x, y, theta)
-            status = self._extend(first)
-        return status
+        if first_child == UNTRIED:
+            self._first_child[node] = NO_CHILD
+        if outcome != EXTENDED:
+            self.refused += outcome == REFUSED
+            return 0
+        steps, v, omega, controls, _ = self._extension[0]
+        self._remember(node, v, omega)
+        for i in range(self._control_dimension):
+            control[i] = float(controls[i])
+        self._sample.write(dest)
+        return int(steps)
 
     def _remember(self, node: bytes, v: float, omega: float) -> None:
         """Note the command of a new child, for line 5 of Algorithm II."""
         child = self.children
-        if child == len(self._following):
-            self._following = np.concatenate([self._following, np.empty_like(self._following)])
-            self._commands = np.concatenate([self._commands, np.empty_like(self._commands)])
-        self._following[child] = self._first_child[node]
-        self._commands[child] = v, omega
+        if child == len(self._children):
+            larger = record_array(2 * child, CHILD)
+            larger[:child] = self._children
+            self._children = larger
+        self._children[child] = v, omega, self._first_child[node], 0
         self._first_child[node] = child
         self.children = child + 1
 
@@ -128,59 +113,33 @@ class SteeringDirectedControlSampler(ExtensionSampler):
     """S-RRT: full speed at the best of three steering rates."""
 
 
-OUTCOME_SIZE = 6
-"""Numbers of an outcome: steps, command (2), control or pose in question (3)."""
-
-
 @njit(cache=True)
-def extend_packed(
+def extend_values(
     node: NDArray[np.float64],
     sample: NDArray[np.float64],
-    first: int,
-    following: NDArray[np.int32],
-    commands: NDArray[np.float64],
-    model: NDArray[np.float64],
-    children: NDArray[np.int32],
-    clearances: NDArray[np.float64],
-    frame: NDArray[np.float64],
-    findings: NDArray[np.float64],
-    outcome: NDArray[np.float64],
-    scratch: NDArray[np.float64],
+    first_child: int,
+    children: Records,
+    frame: Records,
+    cells: Records,
+    pieces: Records,
+    corners: Records,
+    models: Records,
+    extensions: Records,
 ) -> int:
-    """:func:`extend` for a caller in Python: flat arrays in, outcome and last state out."""
-    extension = extend(
-        (node[0], node[1], node[2], node[3], node[4]),
-        sample[0],
-        sample[1],
-        first,
-        following,
-        commands,
-        unpack_model(model),
-        unpack_view(children, clearances, frame),
-        findings,
-        scratch,
-    )
-    outcome[0] = extension.steps
-    outcome[1], outcome[2] = extension.command
-    outcome[3], outcome[4], outcome[5] = extension.control
+    """:func:`extend` for a caller in Python: arrays in; the outcome, the end in ``sample`` and a record out."""
+    scene, model, found = Scene(frame, cells, pieces, corners), models[0], extensions[0]
+    state = (node[0], node[1], node[2], node[3], node[4])
+    margin = margin_at(node[0], node[1], node[2], scene, model.room)
+    extension = extend(state, margin, (sample[0], sample[1]), first_child, children, scene, model, found.block)
+    found.steps = extension.steps
+    found.v_command, found.omega_command = extension.command
+    found.control[0], found.control[1], found.control[2] = extension.control
     if extension.outcome == EXTENDED:
         sample[0], sample[1], sample[2], sample[3], sample[4] = extension.state
     return extension.outcome
 
 
-def warm_up_sampler(model: NDArray[np.float64], clearance_map: ClearanceMap) -> None:
+def warm_up_sampler(model: Records, scene: Scene) -> None:
     """Load or compile the samplers' kernel."""
-    extend_packed(
-        np.array([0.5, 0.5, 0.0, 0.0, 0.0]),
-        np.array([0.6, 0.6, 0.0, 0.0, 0.0]),
-        NO_CHILD,
-        np.empty(1, dtype=np.int32),
-        np.empty((1, 2)),
-        model,
-        clearance_map.children,
-        clearance_map.clearances,
-        clearance_map.frame,
-        clearance_map.findings,
-        np.empty(OUTCOME_SIZE),
-        np.empty(SCRATCH_SHAPE),
-    )
+    node, sample = np.array([0.5, 0.5, 0.0, 0.0, 0.0]), np.array([0.6, 0.6, 0.0, 0.0, 0.0])
+    extend_values(node, sample, NO_CHILD, record_array(1, CHILD), *scene, model, record_array(1, EXTENSION))

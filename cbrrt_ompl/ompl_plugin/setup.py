@@ -6,12 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from cbrrt_ompl.errors import UnknownPlannerError
-from cbrrt_ompl.motion.model import CLOSED_LOOP, check_step, law_of, pack_model
+from cbrrt_ompl.motion.model import CLOSED_LOOP, check_step, law_of, make_model
+from cbrrt_ompl.motion.records import Records
 from cbrrt_ompl.ompl_plugin.binding import ob, oc
 from cbrrt_ompl.ompl_plugin.decomposition import PositionDecomposition
 from cbrrt_ompl.ompl_plugin.goals import make_goal
@@ -58,19 +55,15 @@ OMPL_PLANNERS: dict[str, Callable[[Any, Scenario], Any]] = {
 
 @dataclass
 class Equipment:
-    """What one planner was given: its model, its map and, once it has begun, its sampler.
+    """What one planner was given: its model and, once it has begun, its sampler.
 
     Attributes:
-        model: packed model, see :func:`cbrrt_ompl.motion.model.pack_model`.
-        clearance_map: decides its states.
+        model: see :func:`cbrrt_ompl.motion.model.make_model`.
         sampler: the sampler allocated last; None for OMPL's own planners.
-        should_stop: see :class:`ExtensionSampler`; given to the samplers allocated from now on.
     """
 
-    model: NDArray[np.float64]
-    clearance_map: ClearanceMap
+    model: Records
     sampler: ExtensionSampler | None = None
-    should_stop: Callable[[int], bool] = lambda _: False
 
 
 def make_setup(scenario: Scenario, planner: str = "cb-rrt") -> Any:
@@ -93,15 +86,12 @@ def make_setup(scenario: Scenario, planner: str = "cb-rrt") -> Any:
     return make_equipped_setup(scenario, planner)[0]
 
 
-def make_equipped_setup(
-    scenario: Scenario, planner: str = "cb-rrt", clearance_map: ClearanceMap | None = None
-) -> tuple[Any, Equipment]:
+def make_equipped_setup(scenario: Scenario, planner: str = "cb-rrt") -> tuple[Any, Equipment]:
     """:func:`make_setup` together with what the planner was given.
 
     Args:
         scenario: world, robot, start, goal and settings.
         planner: see :func:`make_setup`.
-        clearance_map: map of the scenario's world and footprint; a new one if None.
     """
     check_scenario(scenario)
     known = [*SAMPLERS, *COMPILED_PLANNERS, *OMPL_PLANNERS]
@@ -117,20 +107,19 @@ def make_equipped_setup(
     si = setup.getSpaceInformation()
     si.setPropagationStepSize(scenario.planning.step)
     si.setMinMaxControlDuration(1, scenario.planning.steps)
-    clearance_map = clearance_map or ClearanceMap(scenario.world, scenario.robot.footprint)
-    setup.setStateValidityChecker(FclStateValidityChecker(si, space, clearance_map))
+    setup.setStateValidityChecker(FclStateValidityChecker(si, space, scenario.world, scenario.robot.footprint))
     start = ob.State(space)
     set_state(start(), scenario.start)
     setup.setStartState(start)
     setup.setGoal(make_goal(si, space, scenario.goal))
-    equipment = equip(si, space, scenario, planner, clearance_map)
-    setup.setPlanner(make_planner(si, scenario, planner, clearance_map))
+    equipment = equip(si, space, scenario, planner)
+    setup.setPlanner(make_planner(si, scenario, planner))
     if planner == "sst":
         setup.setOptimizationObjective(first_solution_objective(si))
     return setup, equipment
 
 
-def equip(si: Any, space: Any, scenario: Scenario, planner: str, clearance_map: ClearanceMap) -> Equipment:
+def equip(si: Any, space: Any, scenario: Scenario, planner: str) -> Equipment:
     """Give a space information the propagator and the directed sampler of one planner, and take away all others.
 
     Args:
@@ -138,38 +127,34 @@ def equip(si: Any, space: Any, scenario: Scenario, planner: str, clearance_map: 
         space: its state space.
         scenario: robot, goal and settings.
         planner: a known planner's name.
-        clearance_map: decides the states.
     """
-    equipment = Equipment(
-        pack_model(law_of(planner, scenario.planning), scenario.robot, scenario.goal, scenario.planning), clearance_map
-    )
+    law = law_of(planner, scenario.planning)
+    equipment = Equipment(make_model(law, scenario.robot, scenario.goal, scenario.planning))
     si.setStatePropagator(TwoWheelPropagator(si, space, equipment.model))
     si.clearDirectedSamplerAllocator()
     if planner in SAMPLERS:
-        sampler_class = SAMPLERS[planner]
+        sampler_class, scene = SAMPLERS[planner], scenario.world.scene(scenario.robot.footprint)
 
         def allocate(owner: Any) -> ExtensionSampler:
-            equipment.sampler = sampler_class(owner, space, equipment.model, clearance_map)
-            equipment.sampler.should_stop = equipment.should_stop
+            equipment.sampler = sampler_class(owner, space, equipment.model, scene)
             return equipment.sampler
 
         si.setDirectedControlSamplerAllocator(oc.DirectedControlSamplerAllocator(allocate))
     return equipment
 
 
-def make_planner(si: Any, scenario: Scenario, planner: str, clearance_map: ClearanceMap) -> Any:
+def make_planner(si: Any, scenario: Scenario, planner: str) -> Any:
     """A planner under our name; for `cb-rrt` and `s-rrt` control::RRT, with the scenario's goal bias.
 
     Args:
         si: the equipped space information.
         scenario: bounds (for Syclop's grid), goal bias, and all that the compiled planners plan for.
         planner: a known planner's name.
-        clearance_map: decides the states of the compiled planners.
     """
     if planner in COMPILED_PLANNERS:
         from cbrrt_ompl.ompl_plugin.compiled_planner import CompiledPlanner  # here, since it builds on this package
 
-        return CompiledPlanner(si, scenario, planner, clearance_map)
+        return CompiledPlanner(si, scenario, planner)
     if planner in SAMPLERS:
         made = oc.RRT(si)
         made.setGoalBias(scenario.planning.goal_bias)

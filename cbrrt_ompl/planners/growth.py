@@ -1,4 +1,4 @@
-"""The compiled loop: Algorithms I and II of the paper over flat arrays.
+"""The compiled loop: Algorithms I and II of the paper over arrays of records.
 
 The robust kind departs from the paper in one line: what is extended is the nearest place that is not passed over, and
 the more extensions from a place have failed, the likelier it is passed over (docs/robust.md).
@@ -7,113 +7,112 @@ the more extensions from a place have failed, the likelier it is passed over (do
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cbrrt_ompl.collision.clearance_map import unpack_view
-from cbrrt_ompl.collision.motion_check import ASK, BLOCKED
+from cbrrt_ompl.collision.scene import Scene
 from cbrrt_ompl.motion.manoeuvres import is_manoeuvre
-from cbrrt_ompl.motion.model import CLOSED_LOOP, in_goal, unpack_model
+from cbrrt_ompl.motion.model import in_goal
+from cbrrt_ompl.motion.records import Records
 from cbrrt_ompl.planners.extension import EXTENDED, NO_CHILD, REFUSED, UNTRIED, extend
-from cbrrt_ompl.planners.nearest import KD_TREE, Index, insert, nearest
+from cbrrt_ompl.planners.nearest import KD_TREE, Index, insert, leave_out, nearest
+from cbrrt_ompl.planners.roll_out import margin_at
 
-REACHED, WANT_ANSWER, WANT_ROOM, WANT_DRAWS, PAUSED = 0, 1, 2, 3, 4
-"""Why the loop returns: a node in the goal, a question to FCL, full arrays, no random numbers left, enough for now."""
+GROW_REACHED, GROW_WANTS_ROOM, GROW_WANTS_DRAWS, GROW_PAUSED = 0, 1, 2, 3
+"""Why the loop returns: a node in the goal, full arrays, no random numbers left, enough for now."""
 
 DRAWS, ROBUST_DRAWS = 4, 5
-"""Random numbers of a sample: goal bias, x, y, the choice among nodes at one position; and how many
-failures of a place it bears."""
+"""Random numbers of a sample: goal bias, x, y, the choice among nodes at one position; and how many failures of a place
+are tolerated."""
 
-NOT_INDEXED = 2**31 - 1
-"""Robust: failures of a node that its place stands for, so that brute force finds no other nodes than the indexes."""
+NODE = np.dtype(
+    [
+        ("x", np.float64),  # state [m, m, rad, m/s, rad/s]
+        ("y", np.float64),
+        ("theta", np.float64),
+        ("v", np.float64),
+        ("omega", np.float64),
+        ("margin", np.float64),  # see margin_at of roll_out; negative as long as nobody has asked [m]
+        ("v_command", np.float64),  # command that led here first [m/s, rad/s]
+        ("omega_command", np.float64),
+        ("control", np.float64, (3,)),  # that led here, see advance of the model
+        ("parent", np.int32),  # -1 at a root
+        ("steps", np.int32),  # of the edge that led here, 0 at a root
+        ("first_child", np.int32),  # the latest one; NO_CHILD or UNTRIED where there is none
+        ("sibling", np.int32),  # next older child of the same parent, -1 at the end
+        ("twin", np.int32),  # next node at exactly the same position, -1 at the end
+        ("place", np.int32),  # the indexed node at the same position, first of the chain of twins
+        ("any_heading", np.bool_),  # of the margin
+    ],
+    align=True,
+)
+"""A node of the tree."""
 
-NODES, SAMPLES, DRAWN, REFUSALS, COLLISIONS, MANOEUVRE = 0, 1, 2, 3, 4, 5
-"""Counters of a search: nodes, samples, rows of draws used up, extensions refused by line 5, and cut by obstacles; and
-the manoeuvre that led to the last node, 0 if none did."""
-
-COUNTERS = 6
-
-
-class TreeArrays(NamedTuple):
-    """All that is stored of a tree: 92 bytes a node (and 24 more for the references of the closed loop)."""
-
-    states: NDArray[np.float64]
-    """(x, y, theta, v, omega), shape (n, 5)."""
-    commands: NDArray[np.float64]
-    """Command (v, omega) that led here first, shape (n, 2)."""
-    references: NDArray[np.float64]
-    """Closed loop: reference that led here, shape (n, 3); else of shape (0, 3)."""
-    links: NDArray[np.int32]
-    """Links of the nearest-neighbour index, shape (n, 2)."""
-    parents: NDArray[np.int32]
-    """Parent, -1 at a root, shape (n,)."""
-    steps: NDArray[np.int32]
-    """Integration steps of the edge that led here, 0 at a root, shape (n,)."""
-    first_child: NDArray[np.int32]
-    """Latest child, `NO_CHILD` or `UNTRIED` if there is none, shape (n,)."""
-    siblings: NDArray[np.int32]
-    """Next older child of the same parent, -1 at the end, shape (n,)."""
-    twins: NDArray[np.int32]
-    """Next node at exactly the same position, -1 at the end, shape (n,)."""
-    places: NDArray[np.int32]
-    """The indexed node at the same position: the head of the chain of twins, shape (n,)."""
+SEARCH = np.dtype(
+    [
+        ("goal_bias", np.float64),  # fraction of samples that are the goal
+        ("is_robust", np.bool_),
+        ("nodes", np.int64),
+        ("samples", np.int64),
+        ("drawn", np.int64),  # rows of random numbers used up
+        ("refusals", np.int64),  # extensions refused by line 5
+        ("collisions", np.int64),  # extensions cut off by an obstacle
+    ],
+    align=True,
+)
+"""Settings and counters of a search, carried from call to call."""
 
 
 @njit(cache=True)
-def add_node(tree: TreeArrays, index: Index, node: int, parent: int) -> None:
-    """Link a node whose state, command and steps are there already.
+def add_node(tree: Records, index: Index, number: int, parent: int) -> None:
+    """Link a node whose state, command, control and steps are there already.
 
     A node at exactly the position of its parent or of a sibling becomes a twin of it, all others enter the index.
     """
-    tree.parents[node] = parent
-    tree.first_child[node] = UNTRIED
-    tree.siblings[node] = -1
-    tree.twins[node] = -1
-    tree.places[node] = node
+    node = tree[number]
+    node.parent, node.first_child, node.sibling, node.twin, node.place = parent, UNTRIED, -1, -1, number
+    node.margin, node.any_heading = -1.0, False
     if parent >= 0:
-        tree.siblings[node] = tree.first_child[parent]
-        tree.first_child[parent] = node
-        x, y = tree.states[node, 0], tree.states[node, 1]
-        near = parent
-        sibling = tree.siblings[node]
-        while sibling >= 0 and not (tree.states[near, 0] == x and tree.states[near, 1] == y):
-            near, sibling = sibling, tree.siblings[sibling]
-        if tree.states[near, 0] == x and tree.states[near, 1] == y:
-            place = tree.places[near]
-            tree.places[node] = place
-            tree.twins[node] = tree.twins[place]
-            tree.twins[place] = node
+        node.sibling = tree[parent].first_child
+        tree[parent].first_child = number
+        near, sibling = parent, node.sibling
+        while sibling >= 0 and not (tree[near].x == node.x and tree[near].y == node.y):
+            near, sibling = sibling, tree[sibling].sibling
+        if tree[near].x == node.x and tree[near].y == node.y:
+            place = tree[near].place
+            node.place, node.twin = place, tree[place].twin
+            tree[place].twin = number
+            leave_out(index, number)
             return
-    insert(index, node)
+    insert(index, number, node.x, node.y)
 
 
 @njit(cache=True)
-def one_of_twins(tree: TreeArrays, place: int, draw: float) -> int:
+def one_of_twins(tree: Records, place: int, draw: float) -> int:
     """A node at the position of an indexed one, all equally likely.
 
     Args:
-        tree: the tree.
+        tree: records of type `NODE`.
         place: the indexed node.
         draw: random number in [0, 1).
 
     Note:
-        The paper does not say which of several nearest nodes is extended; this reading is PAPER's.
+        The paper does not say which of several nearest nodes is extended; this is our reading.
     """
-    count, node = 0, place
-    while node >= 0:
+    count, number = 0, place
+    while number >= 0:
         count += 1
-        node = tree.twins[node]
-    skip, node = int(draw * count), place
+        number = tree[number].twin
+    skip, number = int(draw * count), place
     for _ in range(skip):
-        node = tree.twins[node]
-    return node
+        number = tree[number].twin
+    return number
 
 
 @njit(cache=True)
-def bearable_failures(draw: float) -> float:
+def tolerated_failures(draw: float) -> float:
     """Most failures with which a place is not passed over: one with f failures is with the chance f / (1 + f).
 
     Args:
@@ -123,135 +122,69 @@ def bearable_failures(draw: float) -> float:
 
 
 @njit(cache=True)
-def rebuild_index(tree: TreeArrays, index: Index, count: int) -> None:
-    """Enter all nodes that stand for their position into an empty index."""
-    for node in range(count):
-        if tree.places[node] == node:
-            insert(index, node)
-
-
-@njit(cache=True)
 def grow(
-    states: NDArray[np.float64],
-    commands: NDArray[np.float64],
-    references: NDArray[np.float64],
-    links: NDArray[np.int32],
-    parents: NDArray[np.int32],
-    steps: NDArray[np.int32],
-    first_child: NDArray[np.int32],
-    siblings: NDArray[np.int32],
-    twins: NDArray[np.int32],
-    places: NDArray[np.int32],
-    failures: NDArray[np.int32],
-    heads: NDArray[np.int32],
-    occupied: NDArray[np.int64],
-    stack: NDArray[np.float64],
-    kind: int,
-    cell: float,
-    packed_model: NDArray[np.float64],
-    goal_bias: float,
-    children: NDArray[np.int32],
-    clearances: NDArray[np.float64],
-    frame: NDArray[np.float64],
+    tree: Records,
+    index: Index,
+    searches: Records,
     draws: NDArray[np.float64],
-    findings: NDArray[np.float64],
-    counters: NDArray[np.int64],
     last_sample: int,
-    question: NDArray[np.float64],
-    scratch: NDArray[np.float64],
+    scene: Scene,
+    models: Records,
+    blocks: Records,
 ) -> int:
     """Draw samples and extend the tree until something is wanted.
 
     Args:
-        states: this and the arrays up to ``places``: see :class:`TreeArrays`.
-        commands: see above.
-        references: see above.
-        links: see above.
-        parents: see above.
-        steps: see above.
-        first_child: see above.
-        siblings: see above.
-        twins: see above.
-        places: see above.
-        failures: failed extensions from each place, kept at its indexed node, shape (n,): the tree grows robustly; of
-            shape (0,) where it does not.
-        heads: this and the next: see :class:`cbrrt_ompl.planners.nearest.Index`.
-        occupied: see above.
-        stack: room for the k-d tree's search.
-        kind: of the index.
-        cell: side of a cell of the grid [m].
-        packed_model: see :func:`cbrrt_ompl.motion.model.pack_model`.
-        goal_bias: share of samples that are the goal.
-        children: this and the next two: the clearance map.
-        clearances: see above.
-        frame: see above.
+        tree: records of type `NODE`.
+        index: of the tree's places.
+        searches: one record of type `SEARCH`, which counts on.
         draws: random numbers in [0, 1), a sample a row, shape (m, DRAWS), or (m, ROBUST_DRAWS).
-        findings: what was found before in the present extension, see :func:`cbrrt_ompl.collision.motion_check.recall`.
-        counters: see `NODES`; carried from call to call, shape (COUNTERS,).
         last_sample: number of samples to pause at.
-        question: takes the pose that FCL must decide, shape (3,).
-        scratch: room for a block of steps, see :mod:`cbrrt_ompl.planners.roll_out`.
+        scene: world and footprint.
+        models: one record of type :data:`cbrrt_ompl.motion.model.MODEL`.
+        blocks: one record of type :data:`cbrrt_ompl.planners.roll_out.STEPS`.
 
     Returns:
-        `REACHED` (the last node is in the goal), `WANT_ANSWER`, `WANT_ROOM`, `WANT_DRAWS` or `PAUSED`. After a question
-        the same extension is repeated.
+        `GROW_REACHED` (the last node is in the goal), `GROW_WANTS_ROOM`, `GROW_WANTS_DRAWS` or `GROW_PAUSED`.
     """
-    tree = TreeArrays(states, commands, references, links, parents, steps, first_child, siblings, twins, places)
-    model = unpack_model(packed_model)
-    view = unpack_view(children, clearances, frame)
-    index = Index(kind, states, links, heads, occupied, view.x_min, view.y_min, cell)
-    is_robust = len(failures) > 0
-    width, height = view.x_max - view.x_min, view.y_max - view.y_min
-    while counters[SAMPLES] < last_sample:
-        if counters[NODES] == len(states) or (kind == KD_TREE and occupied[0] + 2 > len(stack)):
-            return WANT_ROOM
-        if counters[DRAWN] == len(draws):
-            return WANT_DRAWS
-        draw = draws[counters[DRAWN]]
-        x, y = view.x_min + draw[1] * width, view.y_min + draw[2] * height
-        if draw[0] < goal_bias:
-            x, y = model.goal.x, model.goal.y
-        if is_robust:  # the root where all are passed over
-            place = max(nearest(index, x, y, counters[NODES], stack, failures, bearable_failures(draw[4])), 0)
-        else:
-            place = nearest(index, x, y, counters[NODES], stack, None, 0.0)
+    search, model, steps, frame = searches[0], models[0], blocks[0], scene.frame[0]
+    width, height = frame.x_max - frame.x_min, frame.y_max - frame.y_min
+    while search.samples < last_sample:
+        if search.nodes == len(tree) or (index.kind == KD_TREE and index.state[0].depth + 2 > len(index.stack)):
+            return GROW_WANTS_ROOM
+        if search.drawn == len(draws):
+            return GROW_WANTS_DRAWS
+        draw = draws[search.drawn]
+        sample = (frame.x_min + draw[1] * width, frame.y_min + draw[2] * height)
+        if draw[0] < search.goal_bias:
+            sample = (model.goal.x, model.goal.y)
+        most_failures = tolerated_failures(draw[4]) if search.is_robust else math.inf
+        place = max(nearest(index, sample[0], sample[1], search.nodes, most_failures), 0)  # the root if all failed
         parent = one_of_twins(tree, place, draw[3])
-        origin = (
-            states[parent, 0],
-            states[parent, 1],
-            states[parent, 2],
-            states[parent, 3],
-            states[parent, 4],
-        )
-        extension = extend(origin, x, y, first_child[parent], siblings, commands, model, view, findings, scratch)
-        if extension.outcome == ASK:
-            question[0], question[1], question[2] = extension.control
-            return WANT_ANSWER
-        findings[0] = 0.0
-        if first_child[parent] == UNTRIED:
-            first_child[parent] = NO_CHILD
-        counters[DRAWN] += 1
-        counters[SAMPLES] += 1
-        if is_robust and extension.outcome != EXTENDED:
-            failures[place] += 1
+        node = tree[parent]
+        if node.margin < 0.0:
+            node.margin, node.any_heading = margin_at(node.x, node.y, node.theta, scene, model.room)
+        state = (node.x, node.y, node.theta, node.v, node.omega)
+        extension = extend(state, (node.margin, node.any_heading), sample, node.first_child, tree, scene, model, steps)
+        if node.first_child == UNTRIED:
+            node.first_child = NO_CHILD
+        search.drawn += 1
+        search.samples += 1
+        if extension.outcome == EXTENDED:
+            number = search.nodes
+            new = tree[number]
+            new.x, new.y, new.theta, new.v, new.omega = extension.state
+            new.v_command, new.omega_command = extension.command
+            new.control[0], new.control[1], new.control[2] = extension.control
+            new.steps = extension.steps
+            add_node(tree, index, number, parent)
+            search.nodes += 1
+            if is_manoeuvre(extension.control) or in_goal(model.goal, new.x, new.y, new.theta, new.v, new.omega):
+                return GROW_REACHED
+            continue
+        index.places[place].failures += 1
         if extension.outcome == REFUSED:
-            counters[REFUSALS] += 1
-        elif extension.outcome == BLOCKED:
-            counters[COLLISIONS] += 1
+            search.refusals += 1
         else:
-            node = counters[NODES]
-            x, y, theta, v, omega = extension.state
-            states[node, 0], states[node, 1], states[node, 2], states[node, 3], states[node, 4] = x, y, theta, v, omega
-            commands[node, 0], commands[node, 1] = extension.command
-            if model.law == CLOSED_LOOP:
-                references[node, 0], references[node, 1], references[node, 2] = extension.control
-            steps[node] = extension.steps
-            add_node(tree, index, node, parent)
-            if is_robust:
-                failures[node] = 0 if places[node] == node else NOT_INDEXED
-            counters[NODES] += 1
-            if in_goal(model.goal, x, y, theta, v, omega):
-                if is_manoeuvre(extension.control):
-                    counters[MANOEUVRE] = int(extension.control[2])
-                return REACHED
-    return PAUSED
+            search.collisions += 1
+    return GROW_PAUSED

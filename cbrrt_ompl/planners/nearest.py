@@ -1,7 +1,8 @@
 """Compiled nearest neighbours in (x, y): a grid, a k-d tree and brute force.
 
-All three index positions. Nodes at exactly the position of their parent (point turns) share its entry, so that neither
-structure degenerates; which of them is extended is drawn by lot (see :mod:`cbrrt_ompl.planners.growth`).
+All three index places: positions of nodes. Nodes at exactly the position of their parent or of a sibling (point turns)
+share its place, so that neither structure degenerates; which of them is extended is drawn by lot (see
+:mod:`cbrrt_ompl.planners.growth`).
 """
 
 from __future__ import annotations
@@ -13,6 +14,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cbrrt_ompl.motion.records import Records, record_array
+from cbrrt_ompl.planners.bits import highest_bit, lowest_bit
+from cbrrt_ompl.problem.obstacles import Bounds
 from cbrrt_ompl.problem.settings import NEAREST_NEIGHBOUR
 
 GRID, KD_TREE, BRUTE_FORCE = 0, 1, 2
@@ -21,165 +25,300 @@ GRID, KD_TREE, BRUTE_FORCE = 0, 1, 2
 KINDS = dict(zip(NEAREST_NEIGHBOUR, (GRID, KD_TREE, BRUTE_FORCE), strict=True))
 """Their names in the settings."""
 
+PLACE = np.dtype(
+    [
+        ("x", np.float64),  # [m]
+        ("y", np.float64),
+        ("left", np.int32),  # grid: next place of the cell; k-d tree: left child; -1 at the end
+        ("right", np.int32),  # k-d tree: right child
+        ("failures", np.int32),  # extensions from here that have failed
+        ("unused", np.int32),
+    ],
+    align=True,
+)
+"""What an index knows of a node."""
+
+INDEX_STATE = np.dtype([("places", np.int64), ("depth", np.int64)], align=True)
+"""How many places are indexed, and how deep the k-d tree is."""
+
+NOT_INDEXED = 2**31 - 1
+"""Failures of a node that its place stands for, so that brute force finds no other nodes than the indexes."""
+
+WORD = 64
+"""Bits of a word; the columns of a grid come in words."""
+
+PLACES_PER_CELL = 2
+"""Nodes that a tree has room for, a cell of its grid."""
+
 
 class Index(NamedTuple):
-    """Positions that can be searched; node numbers point into ``states``."""
+    """Positions that can be searched; a place has the number of its node."""
 
     kind: int
     """`GRID`, `KD_TREE` or `BRUTE_FORCE`."""
-    states: NDArray[np.float64]
-    """State of each node, (x, y) first, shape (n, 5)."""
-    links: NDArray[np.int32]
-    """Grid: next node of the cell. k-d tree: left and right child. -1 at the end, shape (n, 2)."""
+    places: Records
+    """Records of type `PLACE`, one a node, shape (n,)."""
+    state: Records
+    """One record of type `INDEX_STATE`, shape (1,)."""
     heads: NDArray[np.int32]
-    """Grid: first node of each cell, -1 where empty, shape (ny, nx)."""
-    occupied: NDArray[np.int64]
-    """Grid: smallest and largest column, smallest and largest row that hold a node; k-d tree: its depth in [0]; all:
-    the number of indexed nodes in [4]; shape (5,)."""
+    """Grid: first place of each cell, shape (rows, columns)."""
+    words: NDArray[np.uint64]
+    """Grid: a bit for each cell that holds a place, shape (rows, columns / WORD)."""
+    stack: NDArray[np.float64]
+    """K-d tree: room for a search, rows of (place, axis, squared distance of its half plane), shape (m, 3)."""
     x_min: float
     """Lower left corner of the grid [m]."""
     y_min: float
-    cell: float
-    """Side of a cell [m]."""
+    width: float
+    """Sides of a cell [m]."""
+    height: float
 
 
-@njit(cache=True)
-def cell_of(index: Index, x: float, y: float) -> tuple[int, int]:
-    """Column and row of a position; positions outside fall into the nearest cell."""
-    ny, nx = index.heads.shape
-    column = int(min(max((x - index.x_min) / index.cell, 0.0), nx - 1.0))
-    row = int(min(max((y - index.y_min) / index.cell, 0.0), ny - 1.0))
-    return column, row
+def make_index(kind: int, bounds: Bounds, capacity: int, depth: int = 0) -> Index:
+    """An empty index.
+
+    Args:
+        kind: `GRID`, `KD_TREE` or `BRUTE_FORCE`.
+        bounds: where most positions are.
+        capacity: places that there is room for.
+        depth: of a k-d tree that is to be entered.
+    """
+    cells = WORD
+    while kind == GRID and cells * cells * PLACES_PER_CELL < capacity:
+        cells *= 2
+    rows = cells if kind == GRID else 0
+    return Index(
+        kind,
+        record_array(capacity, PLACE),
+        record_array(1, INDEX_STATE),
+        np.empty((rows, cells), dtype=np.int32),
+        np.zeros((rows, cells // WORD), dtype=np.uint64),
+        np.empty((2 * depth + WORD if kind == KD_TREE else 0, 3)),
+        *bounds.min,
+        bounds.size[0] / cells,
+        bounds.size[1] / cells,
+    )
 
 
-@njit(cache=True)
-def insert(index: Index, node: int) -> None:
-    """Add a node whose state is already there."""
-    index.links[node, 0] = -1
-    index.links[node, 1] = -1
+def enlarged(index: Index, bounds: Bounds, nodes: int) -> Index:
+    """The same index with twice the room, its grid finer.
+
+    Args:
+        index: what is full.
+        bounds: see :func:`make_index`.
+        nodes: how many of its places are in use.
+    """
+    larger = make_index(index.kind, bounds, 2 * len(index.places), int(index.state["depth"][0]))
+    larger.places[:nodes] = index.places[:nodes]
+    larger.state[:] = index.state
     if index.kind == GRID:
-        column, row = cell_of(index, index.states[node, 0], index.states[node, 1])
-        index.links[node, 0] = index.heads[row, column]
-        index.heads[row, column] = node
-        o = index.occupied
-        o[0], o[1], o[2], o[3] = min(o[0], column), max(o[1], column), min(o[2], row), max(o[3], row)
+        _enter_again(larger, nodes)
+    return larger
+
+
+def with_room_for_a_search(index: Index) -> Index:
+    """The same index with a stack as deep as its k-d tree asks for."""
+    depth = int(index.state["depth"][0])
+    return index._replace(stack=np.empty((2 * depth + WORD, 3))) if index.kind == KD_TREE else index
+
+
+@njit(cache=True)
+def _enter_again(index: Index, nodes: int) -> None:
+    """Enter all places into an empty grid."""
+    for node in range(nodes):
+        if index.places[node].failures != NOT_INDEXED:
+            _insert_into_grid(index, node)
+
+
+@njit(cache=True)
+def insert(index: Index, node: int, x: float, y: float) -> None:
+    """Add a place."""
+    place = index.places[node]
+    place.x, place.y, place.left, place.right, place.failures = x, y, -1, -1, 0
+    if index.kind == GRID:
+        _insert_into_grid(index, node)
     elif index.kind == KD_TREE:
         _insert_into_kd_tree(index, node)
-    index.occupied[4] += 1
+    index.state[0].places += 1
+
+
+@njit(cache=True)
+def leave_out(index: Index, node: int) -> None:
+    """Note that a node has no place of its own."""
+    index.places[node].failures = NOT_INDEXED
+
+
+@njit(cache=True, inline="always")
+def _cell_of(index: Index, x: float, y: float) -> tuple[int, int]:
+    """Row and column of a position; positions outside fall into the nearest cell."""
+    rows, columns = index.heads.shape
+    column = int(min(max((x - index.x_min) / index.width, 0.0), columns - 1.0))
+    row = int(min(max((y - index.y_min) / index.height, 0.0), rows - 1.0))
+    return row, column
+
+
+@njit(cache=True)
+def _insert_into_grid(index: Index, node: int) -> None:
+    """Put a place in front of the others of its cell."""
+    place = index.places[node]
+    row, column = _cell_of(index, place.x, place.y)
+    word, bit = column // WORD, np.uint64(1) << np.uint64(column % WORD)
+    is_taken = index.words[row, word] & bit != 0
+    place.left = index.heads[row, column] if is_taken else -1
+    index.heads[row, column] = node
+    index.words[row, word] |= bit
 
 
 @njit(cache=True)
 def _insert_into_kd_tree(index: Index, node: int) -> None:
-    """Hang a node under the leaf where its position belongs; the first node ever is the root, number 0."""
-    if index.occupied[4] == 0:
+    """Hang a place under the leaf where it belongs; the first one ever is the root, number 0."""
+    state, places = index.state[0], index.places
+    if state.places == 0:
         return
-    parent, axis, depth = 0, 0, 1
+    parent, depth, is_along_x = 0, 1, True
     while True:
-        side = 0 if index.states[node, axis] < index.states[parent, axis] else 1
-        child = index.links[parent, side]
+        goes_left = places[node].x < places[parent].x if is_along_x else places[node].y < places[parent].y
+        child = places[parent].left if goes_left else places[parent].right
         if child < 0:
-            index.links[parent, side] = node
-            index.occupied[0] = max(index.occupied[0], depth)
+            if goes_left:
+                places[parent].left = node
+            else:
+                places[parent].right = node
+            state.depth = max(state.depth, depth)
             return
-        parent, axis, depth = child, 1 - axis, depth + 1
+        parent, depth, is_along_x = child, depth + 1, not is_along_x
 
 
 @njit(cache=True)
-def is_passed_over(node: int, failures: NDArray[np.int32] | None, limit: float) -> bool:
-    """Whether the failures of a node are above a limit; where none are counted, this costs nothing once compiled."""
-    return False if failures is None else failures[node] > limit
-
-
-@njit(cache=True)
-def nearest(
-    index: Index,
-    x: float,
-    y: float,
-    count: int,
-    stack: NDArray[np.float64],
-    failures: NDArray[np.int32] | None = None,
-    limit: float = 0.0,
-) -> int:
-    """The indexed node nearest to a position.
+def nearest(index: Index, x: float, y: float, nodes: int, most_failures: float) -> int:
+    """The place nearest to a position.
 
     Args:
         index: the index; not empty.
         x: position [m].
         y: position [m].
-        count: nodes in the tree, for brute force.
-        stack: room for the k-d tree's search, more rows than the tree is deep, shape (m, 3).
-        failures: failed extensions from each node, shape (n,); None passes no node over.
-        limit: nodes with more failures are passed over.
+        nodes: nodes in the tree, for brute force.
+        most_failures: places with more failures than this are passed over.
 
     Returns:
-        Its number, -1 where all are passed over.
+        Its node, -1 where all are passed over.
     """
     if index.kind == GRID:
-        return _nearest_in_grid(index, x, y, failures, limit)
+        return _nearest_in_grid(index, x, y, most_failures)
     if index.kind == KD_TREE:
-        return _nearest_in_kd_tree(index, x, y, stack, failures, limit)
+        return _nearest_in_kd_tree(index, x, y, most_failures)
     best, node = math.inf, -1
-    for i in range(count):
-        dx, dy = index.states[i, 0] - x, index.states[i, 1] - y
+    for i in range(nodes):
+        place = index.places[i]
+        dx, dy = place.x - x, place.y - y
         squared = dx * dx + dy * dy
-        if squared < best and not is_passed_over(i, failures, limit):
+        if squared < best and place.failures <= most_failures and place.failures != NOT_INDEXED:
             best, node = squared, i
     return node
 
 
 @njit(cache=True)
-def _gap(offset: float, cell: int, cells: int, size: float) -> float:
-    """Distance along one axis from an offset [m] to a cell; the first and the last reach out to infinity."""
-    if cell > 0 and offset < cell * size:
-        return cell * size - offset
-    if cell < cells - 1 and offset > (cell + 1) * size:
-        return offset - (cell + 1) * size
-    return 0.0
-
-
-@njit(cache=True)
-def _nearest_in_grid(index: Index, x: float, y: float, failures: NDArray[np.int32] | None, limit: float) -> int:
-    """Search the cells in square rings around the position, as far as they hold nodes at all."""
-    column, row = cell_of(index, x, y)
-    rows, columns = index.heads.shape
-    left, right, low, high = index.occupied[0], index.occupied[1], index.occupied[2], index.occupied[3]
-    ring = max(0, left - column, column - right, low - row, row - high)
-    last_ring = max(abs(left - column), abs(right - column), abs(low - row), abs(high - row))
-    x_in_cell = x - index.x_min - column * index.cell
-    y_in_cell = y - index.y_min - row * index.cell
-    to_edge = min(x_in_cell, index.cell - x_in_cell, y_in_cell, index.cell - y_in_cell)
-    best, node = math.inf, -1
-    while ring <= last_ring:
-        reach = to_edge + (ring - 1) * index.cell  # nothing in this ring is nearer
-        if node >= 0 and reach > 0.0 and reach * reach >= best:
+def _nearest_in_grid(index: Index, x: float, y: float, most_failures: float) -> int:
+    """Search the rows of cells outwards, and in each row its occupied cells outwards, as far as they can be nearer."""
+    row, column = _cell_of(index, x, y)
+    rows = len(index.heads)
+    best, node = _nearest_in_row(index, x, y, row, column, 0.0, math.inf, -1, most_failures)
+    for offset in range(1, rows):
+        above = index.y_min + (row + offset) * index.height - y  # of the rows' near edges
+        below = y - index.y_min - (row - offset + 1) * index.height
+        is_above = row + offset < rows and above * above < best
+        is_below = row - offset >= 0 and below * below < best
+        if not (is_above or is_below):
             break
-        first_row, last_row = max(row - ring, low), min(row + ring, high)
-        first_column, last_column = max(column - ring, left), min(column + ring, right)
-        for r in range(first_row, last_row + 1):
-            is_whole = r == row - ring or r == row + ring
-            c = first_column if is_whole or column - ring >= left else column + ring
-            y_gap = _gap(y - index.y_min, r, rows, index.cell)
-            while c <= last_column:
-                x_gap = _gap(x - index.x_min, c, columns, index.cell)
-                candidate = index.heads[r, c] if x_gap * x_gap + y_gap * y_gap < best else -1
-                while candidate >= 0:
-                    dx, dy = index.states[candidate, 0] - x, index.states[candidate, 1] - y
-                    squared = dx * dx + dy * dy
-                    if squared < best and not is_passed_over(candidate, failures, limit):
-                        best, node = squared, candidate
-                    candidate = index.links[candidate, 0]
-                c += 1 if is_whole or c == column + ring else max(column + ring - c, 1)
-        ring += 1
+        if is_above:
+            best, node = _nearest_in_row(index, x, y, row + offset, column, above * above, best, node, most_failures)
+        if is_below and below * below < best:
+            best, node = _nearest_in_row(index, x, y, row - offset, column, below * below, best, node, most_failures)
     return node
 
 
+@njit(cache=True, forceinline=True)
+def _nearest_in_row(
+    index: Index,
+    x: float,
+    y: float,
+    row: int,
+    column: int,
+    squared_gap: float,
+    best: float,
+    node: int,
+    most_failures: float,
+) -> tuple[float, int]:
+    """Search one row of the grid, from a column on to the right and then to the left.
+
+    Args:
+        index: the index.
+        x: position [m].
+        y: position [m].
+        row: of the grid.
+        column: of the position.
+        squared_gap: squared distance of the position from the row [m^2].
+        best: squared distance of the nearest place so far [m^2].
+        node: the nearest place so far.
+        most_failures: see :func:`nearest`.
+
+    Returns:
+        The last two numbers but one again.
+    """
+    words, all_bits = index.words[row], ~np.uint64(0)
+    word, bit = column // WORD, np.uint64(column % WORD)
+    cells = words[word] & (all_bits << bit)
+    is_near = True
+    while is_near and (cells != 0 or word + 1 < len(words)):
+        if cells == 0:
+            word += 1
+            cells = words[word]
+            continue
+        c = word * WORD + lowest_bit(cells)
+        gap = max(index.x_min + c * index.width - x, 0.0)
+        is_near = gap * gap + squared_gap < best
+        if is_near:
+            best, node = _nearest_in_cell(index, index.heads[row, c], x, y, best, node, most_failures)
+        cells &= cells - np.uint64(1)
+    word = column // WORD
+    cells = words[word] & ((np.uint64(1) << bit) - np.uint64(1))
+    is_near = True
+    while is_near and (cells != 0 or word > 0):
+        if cells == 0:
+            word -= 1
+            cells = words[word]
+            continue
+        place = highest_bit(cells)
+        c = word * WORD + place
+        gap = max(x - index.x_min - (c + 1) * index.width, 0.0)
+        is_near = gap * gap + squared_gap < best
+        if is_near:
+            best, node = _nearest_in_cell(index, index.heads[row, c], x, y, best, node, most_failures)
+        cells ^= np.uint64(1) << np.uint64(place)
+    return best, node
+
+
+@njit(cache=True, inline="always")
+def _nearest_in_cell(
+    index: Index, place: int, x: float, y: float, best: float, node: int, most_failures: float
+) -> tuple[float, int]:
+    """Search the places of a cell from its first on; see :func:`_nearest_in_row`."""
+    while place >= 0:
+        here = index.places[place]
+        dx, dy = here.x - x, here.y - y
+        squared = dx * dx + dy * dy
+        if squared < best and here.failures <= most_failures:
+            best, node = squared, place
+        place = here.left
+    return best, node
+
+
 @njit(cache=True)
-def _nearest_in_kd_tree(
-    index: Index, x: float, y: float, stack: NDArray[np.float64], failures: NDArray[np.int32] | None, limit: float
-) -> int:
+def _nearest_in_kd_tree(index: Index, x: float, y: float, most_failures: float) -> int:
     """Search depth first, the nearer side first, leaving out what lies beyond the best so far."""
+    places, stack = index.places, index.stack
     best, node = math.inf, -1
-    stack[0, 0], stack[0, 1], stack[0, 2] = 0.0, 0.0, 0.0  # node, axis, squared distance of its half plane
+    stack[0, 0], stack[0, 1], stack[0, 2] = 0.0, 0.0, 0.0
     depth = 1
     while depth > 0:
         depth -= 1
@@ -187,15 +326,15 @@ def _nearest_in_kd_tree(
         if stack[depth, 2] >= best:
             continue
         while i >= 0:
-            dx, dy = index.states[i, 0] - x, index.states[i, 1] - y
+            place = places[i]
+            dx, dy = place.x - x, place.y - y
             squared = dx * dx + dy * dy
-            if squared < best and not is_passed_over(i, failures, limit):
+            if squared < best and place.failures <= most_failures:
                 best, node = squared, i
             offset = dx if axis == 0 else dy
-            near, far = (0, 1) if offset > 0.0 else (1, 0)
-            if index.links[i, far] >= 0 and offset * offset < best:
-                stack[depth, 0], stack[depth, 1] = index.links[i, far], 1 - axis
-                stack[depth, 2] = offset * offset
+            near, far = (place.left, place.right) if offset > 0.0 else (place.right, place.left)
+            if far >= 0 and offset * offset < best:
+                stack[depth, 0], stack[depth, 1], stack[depth, 2] = far, 1 - axis, offset * offset
                 depth += 1
-            i, axis = index.links[i, near], 1 - axis
+            i, axis = near, 1 - axis
     return node

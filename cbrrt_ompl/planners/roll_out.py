@@ -6,11 +6,10 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from cbrrt_ompl.collision.clearance_map import COLLISION, ROOM, MapView, certify, certify_pose
-from cbrrt_ompl.collision.motion_check import ASK, BLOCKED, FREE, check_step_motion, note, recall, sum_up, ways_of_step
-from cbrrt_ompl.motion.control_laws import tracking_command
+from cbrrt_ompl.collision.clearance import ENOUGH, clearance
+from cbrrt_ompl.collision.motion_check import check_step_motion, lever_arm, way_of_step
+from cbrrt_ompl.collision.scene import Scene
 from cbrrt_ompl.motion.kinematics import (
     displacement,
     has_wheel_limits,
@@ -19,86 +18,172 @@ from cbrrt_ompl.motion.kinematics import (
     ramp,
     saturate,
     stopping_time,
+    stopping_time_of_turn,
     wrap_angle,
 )
 from cbrrt_ompl.motion.manoeuvres import BRAKE, is_manoeuvre, most_steps
-from cbrrt_ompl.motion.model import (
-    CLOSED_LOOP,
-    STEERING,
-    Model,
-    advance,
-    has_come_to_end,
-    in_goal,
-    manoeuvre_command,
-    manoeuvre_has_ended,
-)
+from cbrrt_ompl.motion.model import CLOSED_LOOP, STEERING, advance, in_goal, manoeuvre_has_ended
+from cbrrt_ompl.motion.records import Record
+
+MOTION_FREE, MOTION_BLOCKED = 0, 1
+"""Outcomes of a motion."""
 
 BLOCK = 48
 """Steps that are integrated at once, before the first of them is checked."""
 
-SCRATCH_SHAPE = (6, BLOCK + 1)
-"""Room for a block: v, omega, theta, heading in the middle of the step, dx, dy."""
+SHORT_BLOCK = 8
+"""The same near an obstacle, where the first steps may well be refused."""
+
+NEAR = 0.2
+"""Margin below which the first block is a short one [m]."""
+
+STEPS = np.dtype(
+    [
+        *((name, np.float64, (BLOCK + 1,)) for name in ("x", "y", "theta", "v", "omega")),  # at the ends of the steps
+        *((name, np.float64, (BLOCK,)) for name in ("middle", "dx", "dy")),  # heading half-way [rad], way [m]
+    ],
+    align=True,
+)
+"""Room for the states of a block, the first of them before its first step."""
 
 
 @njit(cache=True, forceinline=True)  # else LLVM may leave it a call, which makes an extension a tenth slower
-def integrate_block(
-    theta: float,
-    v: float,
-    omega: float,
-    v_command: float,
-    omega_command: float,
-    steps: int,
-    model: Model,
-    scratch: NDArray[np.float64],
-) -> None:
+def integrate_block(steps: Record, v_command: float, omega_command: float, count: int, model: Record) -> None:
     """Integrate some steps towards one command, with their sines on vector registers.
 
     They are those of :func:`cbrrt_ompl.motion.model.advance`, bit for bit.
 
     Args:
-        theta: heading at the start [rad].
-        v: forward velocity at the start [m/s].
-        omega: turning rate at the start [rad/s].
+        steps: a record of type `STEPS`; its first state is the one to start from, the others are written.
         v_command: forward velocity asked for [m/s].
         omega_command: turning rate asked for [rad/s].
-        steps: at most `BLOCK`.
-        model: how the robot moves.
-        scratch: its rows v, omega and theta are filled up to ``steps``, the others up to ``steps - 1``.
+        count: at most `BLOCK`.
+        model: how the robot moves, a record of type :data:`cbrrt_ompl.motion.model.MODEL`.
     """
     dt, limits = model.dt, model.limits
+    xs, ys, thetas, vs, omegas = steps.x, steps.y, steps.theta, steps.v, steps.omega
+    middles, dxs, dys = steps.middle, steps.dx, steps.dy
     v_command, omega_command = saturate(v_command, omega_command, limits)
-    vs, omegas, thetas, middles, dxs, dys = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4], scratch[5]
     if model.law == STEERING:
-        v, omega = v_command, omega_command
-    most, most_angular = limits.acceleration * dt, limits.angular_acceleration * dt
-    vs[0], omegas[0], thetas[0] = v, omega, theta
+        vs[0], omegas[0] = v_command, omega_command
+    theta, v, omega = thetas[0], vs[0], omegas[0]
     if has_wheel_limits(limits):
-        for i in range(steps):
+        for i in range(count):
             v, omega_next = joint_ramp(v, omega, v_command, omega_command, limits, dt)
             middles[i] = middle_heading(theta, omega, omega_next, dt)
             theta = wrap_angle(theta + 0.5 * (omega + omega_next) * dt)
             omega = omega_next
             vs[i + 1], omegas[i + 1], thetas[i + 1] = v, omega, theta
     else:
-        for i in range(steps):
+        most, most_angular = limits.acceleration * dt, limits.angular_acceleration * dt
+        for i in range(count):
             v, omega_next = ramp(v, v_command, most), ramp(omega, omega_command, most_angular)
             middles[i] = middle_heading(theta, omega, omega_next, dt)
             theta = wrap_angle(theta + 0.5 * (omega + omega_next) * dt)
             omega = omega_next
             vs[i + 1], omegas[i + 1], thetas[i + 1] = v, omega, theta
-    for i in range(steps):
+    for i in range(count):
         dxs[i], dys[i] = displacement(middles[i], vs[i], omegas[i], vs[i + 1], omegas[i + 1], dt)
+    x, y = xs[0], ys[0]
+    for i in range(count):
+        x, y = x + dxs[i], y + dys[i]
+        xs[i + 1], ys[i + 1] = x, y
+
+
+@njit(cache=True)
+def integrate_stepwise(
+    steps: Record, control: tuple[float, float, float], count: int, model: Record
+) -> tuple[int, bool]:
+    """Integrate some steps under a control that is evaluated anew at each: a closed loop or a manoeuvre.
+
+    Args:
+        steps: see :func:`integrate_block`.
+        control: see :func:`cbrrt_ompl.motion.model.advance`.
+        count: at most `BLOCK`.
+        model: see :func:`integrate_block`.
+
+    Returns:
+        How many steps there are, fewer where a manoeuvre comes to its end; and whether it does.
+    """
+    state = (steps.x[0], steps.y[0], steps.theta[0], steps.v[0], steps.omega[0])
+    is_manoeuvring = is_manoeuvre(control)
+    for i in range(1, count + 1):
+        x, y, theta, v, omega = state
+        x, y, theta, v, omega, _, _ = advance(x, y, theta, v, omega, control, model, model.dt)
+        steps.x[i], steps.y[i], steps.theta[i], steps.v[i], steps.omega[i] = x, y, theta, v, omega
+        state = (x, y, theta, v, omega)
+        if is_manoeuvring and manoeuvre_has_ended(control[2], state, model.goal):
+            return i, True
+    return count, False
+
+
+@njit(cache=True, inline="always")
+def state_at(steps: Record, i: int) -> tuple[float, float, float, float, float]:
+    """The state at the end of a block's step, 0 before the first: (x, y, theta, v, omega)."""
+    return steps.x[i], steps.y[i], steps.theta[i], steps.v[i], steps.omega[i]
+
+
+@njit(cache=True)
+def first_in_goal(steps: Record, count: int, goal: Record) -> int:
+    """The first step of a block that ends in the goal region, or one more than there are."""
+    near = goal.tolerance * goal.tolerance * (1.0 + 1e-9)
+    for i in range(1, count + 1):
+        dx, dy = steps.x[i] - goal.x, steps.y[i] - goal.y
+        if dx * dx + dy * dy < near and in_goal(goal, *state_at(steps, i)):
+            return i
+    return count + 1
+
+
+@njit(cache=True)
+def free_steps(
+    steps: Record, count: int, margin: float, any_heading: bool, scene: Scene, model: Record
+) -> tuple[int, float, bool]:
+    """How many steps of a block are free, one after the other.
+
+    Args:
+        steps: a record of type `STEPS`.
+        count: how many there are.
+        margin: distance proven free before the first of them, beyond the model's room [m].
+        any_heading: see :func:`cbrrt_ompl.collision.motion_check.lever_arm`.
+        scene: world and footprint.
+        model: a record of type :data:`cbrrt_ompl.motion.model.MODEL`.
+
+    Returns:
+        The number, and the margin and its ``any_heading`` after the last free one.
+    """
+    dt, room, jumps = model.dt, model.room, model.law == STEERING
+    frame = scene.frame[0]
+    for i in range(count):
+        start, end = state_at(steps, i), state_at(steps, i + 1)
+        if jumps:
+            start = (start[0], start[1], start[2], end[3], end[4])
+        way = way_of_step(start, end, lever_arm(frame, any_heading), dt)
+        if margin >= way:
+            margin -= way
+        else:
+            margin, any_heading = check_step_motion(start, end, margin, any_heading, scene, room, dt)
+            if margin <= 0.0:
+                return i, margin, any_heading
+    return count, margin, any_heading
+
+
+@njit(cache=True)
+def margin_at(x: float, y: float, theta: float, scene: Scene, room: float) -> tuple[float, bool]:
+    """Margin of a valid pose beyond the room, 0 where it has less than a motion needs; and its ``any_heading``."""
+    distance, any_heading = clearance(scene, x, y, theta, ENOUGH)
+    return max(distance - room, 0.0), any_heading and distance > room
 
 
 @njit(cache=True)
 def roll_out(
     node: tuple[float, float, float, float, float],
     control: tuple[float, float, float],
-    model: Model,
-    view: MapView,
-    findings: NDArray[np.float64],
-    scratch: NDArray[np.float64],
-) -> tuple[int, int, tuple[float, float, float, float, float], tuple[float, float, float]]:
+    margin: float,
+    any_heading: bool,
+    scene: Scene,
+    model: Record,
+    steps: Record,
+) -> tuple[int, int, tuple[float, float, float, float, float]]:
     """Drive from a valid state under one control until the horizon, the goal or an obstacle.
 
     A manoeuvre has no horizon: it is free if it comes to its own end.
@@ -106,141 +191,109 @@ def roll_out(
     Args:
         node: (x, y, theta, v, omega) at the start.
         control: see :func:`cbrrt_ompl.motion.model.advance`, whose steps these are, bit for bit.
-        model: how the robot moves.
-        view: the clearance map.
-        findings: what was found before, see :func:`cbrrt_ompl.collision.motion_check.recall`.
-        scratch: room for a block, of shape `SCRATCH_SHAPE`.
+        margin: of the node's pose, see :func:`margin_at`.
+        any_heading: of that margin.
+        scene: world and footprint.
+        model: how the robot moves, a record of type :data:`cbrrt_ompl.motion.model.MODEL`.
+        steps: room for a block, a record of type `STEPS`.
 
     Returns:
-        The number of steps known to be free; `FREE`, `BLOCKED` or `ASK`; the state after these steps; and the pose
-        that FCL must decide.
+        The number of steps that are free; `MOTION_FREE` or `MOTION_BLOCKED`; and the state after these steps.
     """
-    x, y, theta, v, omega = node
-    dt, goal, steps = model.dt, model.goal, model.steps
-    manoeuvres = is_manoeuvre(control)
-    if manoeuvres:
-        steps = most_steps(control[2], math.hypot(goal.x - x, goal.y - y), model.limits, dt)
-    reach = 0.0 if view.is_round else view.outer
-    near_goal = goal.tolerance * goal.tolerance * (1.0 + 1e-9)
-    is_known, margin, is_certified = recall(findings)
-    if not is_known:
-        margin, is_certified = certify_pose(view, x, y, theta, ROOM)
-        if margin <= 0.0:  # valid all the same, yet with less room than a motion needs
-            margin, is_certified = 0.0, False
-        note(findings, margin, is_certified)
-    k = 0
-    while k < steps:
-        if manoeuvres or model.law == CLOSED_LOOP:
-            if manoeuvres:
-                v_command, omega_command = manoeuvre_command((x, y, theta, v, omega), control[2], model)
-            else:
-                v_command, omega_command = tracking_command(x, y, theta, control, model.limits, model.gains)
-            count = 1
+    is_manoeuvring = is_manoeuvre(control)
+    left = model.steps
+    if is_manoeuvring:
+        left = most_steps(
+            control[2], math.hypot(model.goal.x - node[0], model.goal.y - node[1]), model.limits, model.dt
+        )
+    steps.x[0], steps.y[0], steps.theta[0], steps.v[0], steps.omega[0] = node
+    driven = 0
+    size = SHORT_BLOCK if margin < NEAR else BLOCK
+    while left > 0:
+        count, is_over = min(size, left), False
+        if is_manoeuvring or model.law == CLOSED_LOOP:
+            count, is_over = integrate_stepwise(steps, control, count, model)
         else:
-            v_command, omega_command = control[0], control[1]
-            count = min(BLOCK, steps - k)
-        integrate_block(theta, v, omega, v_command, omega_command, count, model, scratch)
-        for i in range(count):
-            start = (x, y, theta, scratch[0, i], scratch[1, i])
-            end = (x + scratch[4, i], y + scratch[5, i], scratch[2, i + 1], scratch[0, i + 1], scratch[1, i + 1])
-            travel, sweep = ways_of_step(start, end, reach, dt)
-            used = travel if is_certified else sweep
-            if margin >= used:
-                margin -= used
-            else:
-                outcome, margin, is_certified, pose = check_step_motion(
-                    start, end, travel, sweep, margin, is_certified, view, findings, dt
-                )
-                if outcome != FREE:
-                    if outcome == ASK and not model.keep_cut:
-                        if is_doomed(x, y, theta, v, omega, steps - k, control, model, view):
-                            outcome = BLOCKED
-                            note(findings, COLLISION, False)
-                    return k, outcome, (x, y, theta, v, omega), pose
-            x, y, theta, v, omega = end
-            k += 1
-            if manoeuvres:
-                if manoeuvre_has_ended(control[2], (x, y, theta, v, omega), goal):
-                    return k, FREE, (x, y, theta, v, omega), (x, y, theta)
-                continue
-            dx, dy = x - goal.x, y - goal.y
-            if dx * dx + dy * dy < near_goal and in_goal(goal, x, y, theta, v, omega):
-                return k, FREE, (x, y, theta, v, omega), (x, y, theta)
-    return steps, BLOCKED if manoeuvres else FREE, (x, y, theta, v, omega), (x, y, theta)
+            integrate_block(steps, control[0], control[1], count, model)
+        if not is_manoeuvring:
+            goal_at = first_in_goal(steps, count, model.goal)
+            count, is_over = min(count, goal_at), goal_at <= count
+        free, margin, any_heading = free_steps(steps, count, margin, any_heading, scene, model)
+        driven += free
+        if free < count:
+            return driven, MOTION_BLOCKED, state_at(steps, free)
+        if is_over:
+            return driven, MOTION_FREE, state_at(steps, free)
+        left -= count
+        steps.x[0], steps.y[0], steps.theta[0], steps.v[0], steps.omega[0] = state_at(steps, count)
+        size = BLOCK
+    return driven, MOTION_BLOCKED if is_manoeuvring else MOTION_FREE, state_at(steps, 0)
 
 
 @njit(cache=True)
-def is_doomed(
-    x: float,
-    y: float,
-    theta: float,
-    v: float,
-    omega: float,
-    steps: int,
-    control: tuple[float, float, float],
-    model: Model,
-    view: MapView,
-) -> bool:
-    """Whether the map alone shows that the next steps meet an obstacle: then FCL need not be asked."""
-    for _ in range(steps):
-        x, y, theta, v, omega, _, _ = advance(x, y, theta, v, omega, control, model, model.dt)
-        if certify_pose(view, x, y, theta, ROOM)[0] == COLLISION:
-            return True
-        if has_come_to_end((x, y, theta, v, omega), control, model):
-            return False
-    return False
-
-
-@njit(cache=True)
-def drive_safely(
+def roll_out_brake_safe(
     node: tuple[float, float, float, float, float],
     control: tuple[float, float, float],
-    model: Model,
-    view: MapView,
-    findings: NDArray[np.float64],
-    scratch: NDArray[np.float64],
-) -> tuple[int, int, tuple[float, float, float, float, float], tuple[float, float, float]]:
+    margin: float,
+    any_heading: bool,
+    scene: Scene,
+    model: Record,
+    steps: Record,
+) -> tuple[int, int, tuple[float, float, float, float, float]]:
     """:func:`roll_out`, cut before the first step whose end leaves no room to brake where the model is brake-safe.
 
     Robots whose velocities jump stop on the spot, so that nothing is cut.
     """
-    steps, outcome, end, pose = roll_out(node, control, model, view, findings, scratch)
-    if not model.brake_safe or model.law == STEERING or outcome == ASK or (outcome == BLOCKED and not model.keep_cut):
-        return steps, outcome, end, pose
-    unchecked = steps
+    driven, outcome, end = roll_out(node, control, margin, any_heading, scene, model, steps)
+    if not model.brake_safe or model.law == STEERING or (outcome == MOTION_BLOCKED and not model.keep_cut):
+        return driven, outcome, end
+    unchecked = driven
     if not model.keep_cut:  # the end first: it is the likeliest to be refused
         unchecked -= 1
-        stops, asked = check_braking(end, model, view, findings, scratch)
-        if stops != FREE:
-            return 0, stops, node, asked
-    x, y, theta, v, omega = node
+        if not can_brake(end, -1.0, False, scene, model, steps)[0]:
+            return 0, MOTION_BLOCKED, node
+    frame, state = scene.frame[0], node
     for k in range(unchecked):
-        before = (x, y, theta, v, omega)
+        x, y, theta, v, omega = state
         x, y, theta, v, omega, _, _ = advance(x, y, theta, v, omega, control, model, model.dt)
-        stops, asked = check_braking((x, y, theta, v, omega), model, view, findings, scratch)
-        if stops != FREE:
-            return k, stops, before, asked
-    return steps, outcome, end, pose
+        after = (x, y, theta, v, omega)
+        margin -= way_of_step(state, after, lever_arm(frame, any_heading), model.dt)
+        is_safe, margin, any_heading = can_brake(after, margin, any_heading, scene, model, steps)
+        if not is_safe:
+            return k, MOTION_BLOCKED, state
+        state = after
+    return driven, outcome, end
 
 
 @njit(cache=True)
-def check_braking(
+def can_brake(
     state: tuple[float, float, float, float, float],
-    model: Model,
-    view: MapView,
-    findings: NDArray[np.float64],
-    scratch: NDArray[np.float64],
-) -> tuple[int, tuple[float, float, float]]:
-    """Brake to rest from a valid state: `FREE`, `BLOCKED` or `ASK`, and the pose that FCL must decide."""
-    stopping_distance = abs(state[3]) * (0.5 * stopping_time(state[3], state[4], model.limits) + model.dt)
-    is_known, margin, _ = recall(findings)
-    if not is_known:
-        margin = certify(view, state[0], state[1], ROOM)
-        note(findings, margin, True)
-    if margin > stopping_distance:
-        return FREE, (0.0, 0.0, 0.0)
-    row = int(findings[0, 1])
-    _, outcome, _, pose = roll_out(state, (0.0, 0.0, BRAKE), model, view, findings, scratch)
-    if outcome == FREE:
-        sum_up(findings, row)
-    return outcome, pose
+    margin: float,
+    any_heading: bool,
+    scene: Scene,
+    model: Record,
+    steps: Record,
+) -> tuple[bool, float, bool]:
+    """Whether the robot can brake to rest from a valid state.
+
+    Args:
+        state: (x, y, theta, v, omega).
+        margin: what is known of its pose's margin [m]; negative where nothing is.
+        any_heading: of that margin.
+        scene: see :func:`roll_out`.
+        model: see :func:`roll_out`.
+        steps: see :func:`roll_out`.
+
+    Returns:
+        The answer, and what is known of the margin afterwards.
+    """
+    dt, limits, frame = model.dt, model.limits, scene.frame[0]
+    distance = abs(state[3]) * (0.5 * stopping_time(state[3], state[4], limits) + dt)
+    turn = abs(state[4]) * (0.5 * stopping_time_of_turn(state[3], state[4], limits) + dt)
+    if margin > distance + lever_arm(frame, any_heading) * turn:
+        return True, margin, any_heading
+    margin, any_heading = margin_at(state[0], state[1], state[2], scene, model.room)
+    if margin > distance + lever_arm(frame, any_heading) * turn:
+        return True, margin, any_heading
+    outcome = roll_out(state, (0.0, 0.0, BRAKE), margin, any_heading, scene, model, steps)[1]
+    return outcome == MOTION_FREE, margin, any_heading

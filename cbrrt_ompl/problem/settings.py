@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from numbers import Integral
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,6 +33,24 @@ class State(NamedTuple):
     """Forward velocity [m/s]."""
     omega: float = 0.0
     """Turning rate [rad/s]."""
+
+
+def goal_distance(goal: Any, x: float, y: float) -> float:
+    """Distance of a position from a goal's centre, as OMPL computes it to the last bit [m].
+
+    Args:
+        goal: a :class:`Goal`, or the record of one in a kernel.
+        x: position [m].
+        y: position [m].
+    """
+    dx, dy = x - goal.x, y - goal.y
+    return math.sqrt(dx * dx + dy * dy)
+
+
+def heading_error(goal: Any, theta: float) -> float:
+    """How far a heading is from that of a goal which has one, 0 to pi [rad]; see :func:`goal_distance`."""
+    error = abs(theta - goal.theta) % (2.0 * math.pi)
+    return min(error, 2.0 * math.pi - error)
 
 
 @dataclass(frozen=True)
@@ -91,12 +109,11 @@ class Goal:
             A line a violated condition, with the figure and the tolerance.
         """
         found = []
-        dx, dy = state.x - self.x, state.y - self.y
-        distance = math.sqrt(dx * dx + dy * dy)  # as OMPL computes it, to the last bit
+        distance = goal_distance(self, state.x, state.y)
         if not distance < self.tolerance:
             found.append(f"{distance:.6g} m from the goal, tolerance {self.tolerance:g} m")
         if self.theta is not None:
-            error = abs(math.remainder(state.theta - self.theta, math.tau))
+            error = heading_error(self, state.theta)
             if error > self.heading_tolerance:
                 found.append(f"heading off by {error:.6g} rad, tolerance {self.heading_tolerance:g} rad")
         if self.speed_tolerance is not None:
@@ -136,6 +153,8 @@ class PlanningSettings:
     brake_safe: bool = False
     """Keep only what the robot can brake from to rest without collision, from every step on (CB-RRT; the velocities of
     S-RRT jump, so that it always can)."""
+    clearance: float = 0.0
+    """Distance that motions keep from obstacles and bounds [m]; never less than half a millimetre."""
     nearest_neighbour: str = "grid"
     """How the compiled planners find the nearest node: ``grid``, ``kd-tree`` or ``brute-force``."""
 
@@ -162,13 +181,15 @@ class PlanningSettings:
                 problems.append(Problem(f"planning.{name}", getattr(self, name), f"one of {', '.join(known)}"))
         if not is_number(self.equal_control_tolerance, LARGEST):
             problems.append(Problem("planning.equal_control_tolerance", self.equal_control_tolerance, A_NUMBER))
+        if not (is_number(self.clearance, LARGEST) and self.clearance >= 0.0):
+            problems.append(Problem("planning.clearance", self.clearance, "a distance of 0 or more [m]"))
         if self.look_ahead is not None and not _is_positive(self.look_ahead):
             problems.append(Problem("planning.look_ahead", self.look_ahead, f"{A_POSITIVE_NUMBER} [m]"))
         if not isinstance(self.closed_loop, bool | np.bool_):
             problems.append(Problem("planning.closed_loop", self.closed_loop, "True or False"))
         if problems:
             raise SettingsError(problems)
-        _keep_floats(self, "horizon", "step", "goal_bias", "equal_control_tolerance", "look_ahead")
+        _keep_floats(self, "horizon", "step", "goal_bias", "equal_control_tolerance", "look_ahead", "clearance")
 
     def approaches(self, goal: Goal) -> bool:
         """Whether final approaches to a goal are tried."""

@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from cbrrt_ompl.benchmark.experiment import survey
-from cbrrt_ompl.collision.clearance_map import clearance_map_for
 from cbrrt_ompl.ompl_plugin.run import Found, run
 from cbrrt_ompl.planning import plan
 from cbrrt_ompl.problem.robot import Limits
@@ -56,10 +54,10 @@ class Run:
 def measure(part: Part) -> list[Run]:
     """Run a part.
 
-    The clearance map is made before the clock runs, and so are the kernels.
+    The index of the world is made before the clock runs, and so are the kernels.
     """
     scenario = scenario_from_dict(part.scenario)
-    survey(clearance_map_for(scenario.world, scenario.robot.footprint), scenario.world.bounds)
+    scenario.world.scene(scenario.robot.footprint)
     planner = part.key.planner
     plan(scenario, "rrt" if planner == NAIVE else planner, seed=0, time_limit=WARM_UP)
     return [_measure_one(scenario, planner, seed) for seed in part.seeds]

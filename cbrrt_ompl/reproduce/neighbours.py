@@ -9,7 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cbrrt_ompl.planners.nearest import BRUTE_FORCE, GRID, KD_TREE, KINDS, Index, insert, nearest
+from cbrrt_ompl.planners.nearest import BRUTE_FORCE, KINDS, Index, insert, make_index, nearest, with_room_for_a_search
+from cbrrt_ompl.problem.obstacles import Bounds
 
 SIDE = 10.0
 """Side of the world, a square [m]."""
@@ -52,41 +53,35 @@ def query_cost(kind: int, size: int, spread: float = 1.0, most_queries: int = 10
     visits = size if kind == BRUTE_FORCE or spread < 1.0 else 1
     count = max(20, min(most_queries, NODE_VISITS // visits))
     queries = SIDE * rng.random((count, 2))
-    stack = np.empty((2 * int(index.occupied[0]) + 64 if kind == KD_TREE else 0, 3))
-    answer(index, queries[:1], size, stack)
+    answer(index, queries[:1], size)
     began = time.perf_counter()
-    answer(index, queries, size, stack)
+    answer(index, queries, size)
     return (time.perf_counter() - began) / count
 
 
 def build_index(kind: int, positions: NDArray[np.float64]) -> Index:
-    """An index of positions, shape (n, 2), with as many cells as a search would give it: one a node of its capacity."""
+    """An index of positions, shape (n, 2), with as much room as a search would give it."""
     capacity = FIRST_CAPACITY
     while capacity < len(positions):
         capacity *= 2
-    cell = math.sqrt(SIDE * SIDE / capacity)
-    cells = math.ceil(SIDE / cell)
-    heads = np.full((cells, cells) if kind == GRID else (1, 1), -1, dtype=np.int32)
-    occupied = np.array([2**31, -1, 2**31, -1, 0] if kind == GRID else [0] * 5, dtype=np.int64)
-    states = np.zeros((capacity, 5))
-    states[: len(positions), :2] = positions
-    index = Index(kind, states, np.empty((capacity, 2), dtype=np.int32), heads, occupied, 0.0, 0.0, cell)
-    fill(index, len(positions))
-    return index
+    index = make_index(kind, Bounds((0.0, 0.0), (SIDE, SIDE)), capacity)
+    fill(index, positions)
+    return with_room_for_a_search(index)
 
 
 @njit(cache=True)
-def fill(index: Index, count: int) -> None:
-    """Enter the first nodes, one after the other."""
-    for node in range(count):
-        insert(index, node)
+def fill(index: Index, positions: NDArray[np.float64]) -> None:
+    """Enter positions, shape (n, 2), one after the other."""
+    for node in range(len(positions)):
+        insert(index, node, positions[node, 0], positions[node, 1])
 
 
 @njit(cache=True)
-def answer(index: Index, queries: NDArray[np.float64], count: int, stack: NDArray[np.float64]) -> float:
+def answer(index: Index, queries: NDArray[np.float64], count: int) -> float:
     """Ask all queries, shape (m, 2); the sum of the distances keeps the compiler from leaving them out."""
     total = 0.0
     for i in range(len(queries)):
-        node = nearest(index, queries[i, 0], queries[i, 1], count, stack)
-        total += math.hypot(index.states[node, 0] - queries[i, 0], index.states[node, 1] - queries[i, 1])
+        node = nearest(index, queries[i, 0], queries[i, 1], count, math.inf)
+        place = index.places[node]
+        total += math.hypot(place.x - queries[i, 0], place.y - queries[i, 1])
     return total

@@ -276,6 +276,7 @@ PLANNING = {
     "closed_loop": Key(flag),
     "final_approach": Key(flag),
     "brake_safe": Key(flag),
+    "clearance": Key(number),
     "nearest_neighbour": Key(one_of(NEAREST_NEIGHBOUR)),
 }
 SCENARIO = {

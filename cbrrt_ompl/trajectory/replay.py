@@ -7,7 +7,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cbrrt_ompl.motion.control_laws import reference_pose
-from cbrrt_ompl.motion.model import CANDIDATES, STEERING, advance, candidate, unpack_model
+from cbrrt_ompl.motion.model import CANDIDATES, STEERING, advance, candidate
+from cbrrt_ompl.motion.records import Records
+from cbrrt_ompl.problem.robot import Limits
 from cbrrt_ompl.problem.settings import State
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.trajectory.tree import Tree
@@ -17,7 +19,7 @@ MAX_EDGE_POINTS = 1000
 
 
 def trajectory_from_controls(
-    start: NDArray[np.float64], controls: NDArray[np.float64], steps: NDArray[np.int64], model: NDArray[np.float64]
+    start: NDArray[np.float64], controls: NDArray[np.float64], steps: NDArray[np.int64], model: Records
 ) -> Trajectory:
     """Drive from a state by controls, one after the other.
 
@@ -25,15 +27,15 @@ def trajectory_from_controls(
         start: (x, y, theta, v, omega), shape (5,).
         controls: a control a row, see :func:`cbrrt_ompl.motion.model.advance`, shape (n, 3).
         steps: integration steps of each control, shape (n,).
-        model: packed model that the controls were made for.
+        model: model that the controls were made for.
 
     Returns:
         The trajectory on the integration grid, from time 0, with the limits of the model.
     """
     states, commands = replay_path(start, controls, steps, model)
-    t = model[1] * np.arange(len(states))
-    is_kinematic, limits = int(model[0]) == STEERING, unpack_model(model).limits
-    return Trajectory(t, *states.T, *commands.T, kinematic=is_kinematic, limits=limits)
+    t = model["dt"][0] * np.arange(len(states))
+    limits = Limits(*model["limits"][0].tolist())
+    return Trajectory(t, *states.T, *commands.T, kinematic=model["law"][0] == STEERING, limits=limits)
 
 
 def tree_from_controls(
@@ -41,7 +43,7 @@ def tree_from_controls(
     parents: NDArray[np.int64],
     controls: NDArray[np.float64],
     steps: NDArray[np.int64],
-    model: NDArray[np.float64],
+    model: Records,
 ) -> Tree:
     """A tree with the way along every edge.
 
@@ -50,30 +52,29 @@ def tree_from_controls(
         parents: parent of each node, -1 at a root, shape (n,).
         controls: control of the edge to each node, shape (n, 3).
         steps: integration steps of that edge, 0 at a root, shape (n,).
-        model: packed model that the controls were made for.
+        model: model that the controls were made for.
     """
     return Tree(states, parents, replay_edges(states, parents, controls, steps, model))
 
 
-def extension_trajectories(node: State, sample: tuple[float, float], model: NDArray[np.float64]) -> list[Trajectory]:
+def extension_trajectories(node: State, sample: tuple[float, float], model: Records) -> list[Trajectory]:
     """What an extension tries from a node, as if there were no obstacles and no goal.
 
     Args:
         node: state to extend.
         sample: position to drive towards [m].
-        model: packed model.
+        model: see :func:`cbrrt_ompl.motion.model.make_model`.
 
     Returns:
         One whole horizon for CB-RRT; for S-RRT one for each steering rate: right, straight on, left.
     """
-    unpacked = unpack_model(model)
     x, y, theta, v, omega = (float(value) for value in node)
-    reference = reference_pose(x, y, theta, float(sample[0]), float(sample[1]), unpacked.look_ahead)
+    reference = reference_pose(x, y, theta, float(sample[0]), float(sample[1]), model["look_ahead"][0])
     controls = [
-        candidate(index, (x, y, theta, v, omega), reference, unpacked)[2]
-        for index in range(CANDIDATES if unpacked.law == STEERING else 1)
+        candidate(index, (x, y, theta, v, omega), reference, model[0])[2]
+        for index in range(CANDIDATES if model["law"][0] == STEERING else 1)
     ]
-    steps = np.array([unpacked.steps])
+    steps = np.array([model["steps"][0]])
     return [
         trajectory_from_controls(np.array([x, y, theta, v, omega]), np.array([control]), steps, model)
         for control in controls
@@ -82,13 +83,13 @@ def extension_trajectories(node: State, sample: tuple[float, float], model: NDAr
 
 @njit(cache=True)
 def replay_path(
-    start: NDArray[np.float64], controls: NDArray[np.float64], steps: NDArray[np.int64], packed: NDArray[np.float64]
+    start: NDArray[np.float64], controls: NDArray[np.float64], steps: NDArray[np.int64], models: Records
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """States at every step, shape (m + 1, 5), and the command that acts from each on, shape (m + 1, 2).
 
     The last state has no command of its own and repeats the one before it (its own velocities where there is none).
     """
-    model = unpack_model(packed)
+    model = models[0]
     total = steps.sum()
     states, commands = np.empty((total + 1, 5)), np.empty((total + 1, 2))
     x, y, theta, v, omega = start[0], start[1], start[2], start[3], start[4]
@@ -112,13 +113,13 @@ def replay_edges(
     parents: NDArray[np.int64],
     controls: NDArray[np.float64],
     steps: NDArray[np.int64],
-    packed: NDArray[np.float64],
+    models: Records,
 ) -> NDArray[np.float64]:
     """Points (x, y) along all edges, a row of NaN after each edge, shape (m, 2).
 
     An edge has a point a step, or evenly fewer where it has more than `MAX_EDGE_POINTS` steps.
     """
-    model = unpack_model(packed)
+    model = models[0]
     total = 0
     for i in range(len(parents)):
         if parents[i] >= 0:

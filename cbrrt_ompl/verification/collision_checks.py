@@ -13,18 +13,27 @@ from cbrrt_ompl.verification.sweep import Sweep
 from cbrrt_ompl.verification.violation import Violation, place
 
 
-def collision_violations(sweeps: Mapping[str, Sweep]) -> Iterator[Violation]:
-    """Collisions of the motions, by their names."""
+def collision_violations(sweeps: Mapping[str, Sweep], kept: float) -> Iterator[Violation]:
+    """Collisions of the motions, or where they come too near.
+
+    Args:
+        sweeps: of the motions by their names.
+        kept: distance that they were to keep [m].
+    """
     for name, sweep in sweeps.items():
         times = sweep.hit_times
         if not len(times):
             continue
         first, last = float(times[0]), float(times[-1])
         where = place(sweep.hit_poses[0])
-        message = f"collision: the {name} touches an obstacle or a wall at t = {first:.6g} s, at {where}"
+        distance = sweep.smallest_margin + kept
+        kind, what = "collision", "touches an obstacle or a wall"
+        if distance > 0.0:
+            kind, what = "clearance", f"comes within {distance:.6g} m of an obstacle or a wall"
+        message = f"{kind}: the {name} {what} at t = {first:.6g} s, at {where}"
         if len(times) > 1:
             message += f" ({len(times)} states, until t = {last:.6g} s)"
-        yield Violation("collision", first, message, len(times), last)
+        yield Violation(kind, first, message, len(times), last)
 
 
 def sampling_violations(

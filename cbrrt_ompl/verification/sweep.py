@@ -1,28 +1,25 @@
-"""The proof that a motion is free, by FCL's clearances and halved intervals."""
+"""The proof that a motion is free, by exact distances and halved intervals."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cbrrt_ompl.trajectory.trajectory import wrapped
+from cbrrt_ompl.verification.distances import Distances
 from cbrrt_ompl.verification.motion import Motion
-
-if TYPE_CHECKING:
-    from cbrrt_ompl.collision.world import CollisionChecker
 
 PROVEN_SHARE = 0.95
 """The bound on the clearance is pursued until it is this share of the smallest clearance found."""
 
 PURSUED_CHECKS = 20_000
-"""States of a motion that FCL is asked about for that; a bound above 0 suffices afterwards."""
+"""States of a motion that are looked at for that; a bound above 0 suffices afterwards."""
 
 MAX_CHECKS = 200_000
-"""States of a motion that FCL is asked about at most: some seconds."""
+"""States of a motion that are looked at at most: some seconds."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +27,7 @@ class Sweep:
     """What became of a motion that was swept for collisions."""
 
     smallest_margin: float
-    """Smallest margin found [m]."""
+    """Smallest margin found: a distance less what is to be kept [m]."""
     time: float
     """When [s]."""
     pose: tuple[float, float, float]
@@ -38,7 +35,7 @@ class Sweep:
     bound: float
     """What no margin is below [m]."""
     checks: int
-    """States that FCL was asked about."""
+    """States that were looked at."""
     unproven: int
     """Intervals accepted for their free ends alone."""
     hit_times: NDArray[np.float64]
@@ -49,7 +46,7 @@ class Sweep:
     """Time from which on the checks did not suffice [s]; infinite where they did."""
 
 
-def sweep(motion: Motion, checker: CollisionChecker, resolution: float) -> Sweep:
+def sweep(motion: Motion, distances: Distances, resolution: float, kept: float = 0.0) -> Sweep:
     """Prove a motion free, an interval at a time, or find where it is not.
 
     An interval between two states with margins a and b, on which no point moves further than s, holds no state with a
@@ -57,12 +54,13 @@ def sweep(motion: Motion, checker: CollisionChecker, resolution: float) -> Sweep
 
     Args:
         motion: what is to be proven free.
-        checker: FCL's answers.
+        distances: of the footprint from everything.
         resolution: way of any point of the footprint at which halving ends [m].
+        kept: distance that is to be kept; a state that is nearer is no free one [m].
     """
 
     def margins_at(places: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.array([checker.margin(*pose) for pose in motion.poses_at(places).tolist()])
+        return distances.at(motion.poses_at(places)) - kept
 
     ends = np.unique([0.0, len(motion.times) - 1.0])
     asked, found = [ends], [margins_at(ends)]

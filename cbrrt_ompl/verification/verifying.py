@@ -10,6 +10,7 @@ from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.errors import Problem, SettingsError, TrajectoryError
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.verification.collision_checks import collision_violations, sampling_violations
+from cbrrt_ompl.verification.distances import Distances
 from cbrrt_ompl.verification.integration import integrate_again
 from cbrrt_ompl.verification.limit_checks import (
     acceleration_violations,
@@ -44,9 +45,10 @@ def verify(
     the command at the limits of acceleration (kinematic: jump to it), and SciPy integrates heading and position. Every
     row has to agree with that; start, goal and limits are checked besides.
 
-    Both motions, stored and computed again, have to be free of collision at any time. FCL's clearances at two times
-    prove all between them, if together they exceed a bound on the way of any point of the footprint; else the interval
-    is halved, until no point moves more than ``resolution`` in it.
+    Both motions, stored and computed again, have to keep ``planning.clearance`` (less the resolution) at any time, or
+    touch nothing where that is 0. Exact distances at two times, computed by GEOS, prove all between them, if together
+    they exceed a bound on the way of any point of the footprint; else the interval is halved, until no point moves more
+    than ``resolution`` in it.
 
     Args:
         trajectory: what is to be checked.
@@ -73,7 +75,8 @@ def verify(
         if not (is_number(value) and value > 0.0):
             raise SettingsError(Problem(name, value, "a number above 0"))
     footprint = scenario.robot.footprint
-    checker = scenario.world.checker(footprint)
+    distances = Distances(scenario.world, footprint)
+    kept = max(scenario.planning.clearance - resolution, 0.0)
     reach = 0.0 if footprint.is_round else footprint.circumscribed_radius
     limits = scenario.robot.limits
     with np.errstate(all="ignore"):  # absurd numbers overflow, and are reported as violations
@@ -86,24 +89,24 @@ def verify(
             "stored motion": Motion.through(trajectory.t, trajectory.poses, trajectory.step_velocities, reach),
             "motion computed again": Motion.through(trajectory.t, states[:, :3], velocities, reach),
         }
-        sweeps = {name: sweep(motion, checker, resolution) for name, motion in motions.items()}
+        sweeps = {name: sweep(motion, distances, resolution, kept) for name, motion in motions.items()}
         violations = (
             *start_violations(trajectory, scenario),
             *limit_violations(trajectory, limits),
             *wheel_speed_violations(trajectory, limits),
             *accelerations,
             *motion_violations(trajectory, states, tolerance),
-            *collision_violations(sweeps),
+            *collision_violations(sweeps, kept),
             *sampling_violations(trajectory, motions.values(), sweeps.values()),
             *goal_violations(trajectory, scenario),
         )
         nearest = min(sweeps.values(), key=lambda sweep: sweep.smallest_margin)
         return Verification(
             violations=violations,
-            smallest_clearance=checker.clearance(*nearest.pose),
+            smallest_clearance=max(nearest.smallest_margin + kept, 0.0),
             smallest_clearance_time=nearest.time,
             smallest_clearance_pose=nearest.pose,
-            clearance_bound=min(sweep.bound for sweep in sweeps.values()),
+            clearance_bound=min(sweep.bound for sweep in sweeps.values()) + kept,
             resolution=resolution,
             unproven=sum(sweep.unproven for sweep in sweeps.values()),
             tolerance=tolerance,

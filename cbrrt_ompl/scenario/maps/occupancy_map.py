@@ -17,12 +17,12 @@ from cbrrt_ompl.collision.occupancy import (
     OCCUPIED_THRESHOLD,
     UNKNOWN,
     UNKNOWN_CELLS,
+    GridLayer,
     blocked_cells,
     cells_from,
     check_cell_count,
     check_frame,
     grid_bounds,
-    grid_obstacles,
 )
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import MapError, Problem, Remark
@@ -134,7 +134,7 @@ class OccupancyMap:
         Raises:
             MapError: as :meth:`blocked`.
         """
-        return grid_obstacles(self.blocked(unknown), self.resolution, self.origin)
+        return list(GridLayer(self.blocked(unknown), self.resolution, self.origin).obstacles)
 
     def to_world(self, unknown: str | None = None) -> World:
         """World to plan in, bounded by the rectangle around the map.
@@ -145,7 +145,7 @@ class OccupancyMap:
         Raises:
             MapError: as :meth:`blocked`.
         """
-        return World(self.bounds(), self.obstacles(unknown))
+        return World.from_layer(GridLayer(self.blocked(unknown), self.resolution, self.origin))
 
     def save(self, path: str | Path) -> None:
         """Write a ROS map_server map, a YAML file and an image beside it, from which an equal map is read.

@@ -1,0 +1,161 @@
+"""Obstacles and footprints as convex pieces: the records that the kernels read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from cbrrt_ompl.collision.convex import convex_parts
+from cbrrt_ompl.motion.records import Records
+from cbrrt_ompl.problem.obstacles import Box, Disc, Obstacle, OrientedBox, Polygon
+from cbrrt_ompl.problem.robot import Footprint
+
+RECTANGLE, DISC, POLYGON = 0, 1, 2
+"""Kinds of a piece."""
+
+PIECE = np.dtype(
+    [
+        ("kind", np.int32),
+        ("first", np.int32),  # polygon: row of its first corner
+        ("count", np.int32),  # polygon: how many corners it has
+        ("source", np.int32),  # which obstacle it is a part of
+        ("x", np.float64),  # centre [m]
+        ("y", np.float64),
+        ("half_x", np.float64),  # rectangle: half sides; disc: its radius [m]
+        ("half_y", np.float64),
+        ("cos", np.float64),  # rectangle: direction of its first side
+        ("sin", np.float64),
+    ],
+    align=True,
+)
+"""A convex piece of the world or of a footprint."""
+
+CORNER = np.dtype(
+    [
+        ("x", np.float64),  # [m]
+        ("y", np.float64),
+        ("along_x", np.float64),  # unit vector along the edge to the next corner, counter-clockwise
+        ("along_y", np.float64),
+        ("length", np.float64),  # of that edge [m]
+    ],
+    align=True,
+)
+"""A corner of a convex polygon, and the edge that follows it."""
+
+
+class Pieces(NamedTuple):
+    """Convex pieces and the corners that those of them which are polygons refer to."""
+
+    pieces: Records
+    """Records of type `PIECE`, shape (n,)."""
+    corners: Records
+    """Records of type `CORNER`, shape (m,)."""
+
+
+def join(parts: Iterable[Pieces]) -> Pieces:
+    """Several sets of pieces as one; the obstacles are counted through."""
+    pieces, corners, first, sources = [], [], 0, 0
+    for part in parts:
+        moved = part.pieces.copy()
+        moved["first"] += first
+        moved["source"] += sources
+        pieces.append(moved)
+        corners.append(part.corners)
+        first += len(part.corners)
+        sources += int(part.pieces["source"].max(initial=-1)) + 1
+    return Pieces(
+        np.concatenate([np.empty(0, dtype=PIECE), *pieces]), np.concatenate([np.empty(0, dtype=CORNER), *corners])
+    )
+
+
+def obstacle_pieces(obstacles: Sequence[Obstacle]) -> Pieces:
+    """The pieces of obstacles; each knows the number of its obstacle.
+
+    Args:
+        obstacles: boxes, discs and polygons.
+    """
+    boxes = [(i, *o.min, *o.max) for i, o in enumerate(obstacles) if isinstance(o, Box)]
+    turned = [(i, *o.center, *o.size, o.angle) for i, o in enumerate(obstacles) if isinstance(o, OrientedBox)]
+    discs = [(i, *o.center, o.radius) for i, o in enumerate(obstacles) if isinstance(o, Disc)]
+    polygons = [(i, polygon_pieces(o)) for i, o in enumerate(obstacles) if isinstance(o, Polygon)]
+    source, x0, y0, x1, y1 = np.array(boxes, dtype=float).reshape(-1, 5).T
+    straight = _simple_pieces(RECTANGLE, source, 0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (x1 - x0), 0.5 * (y1 - y0))
+    source, x, y, width, height, angle = np.array(turned, dtype=float).reshape(-1, 6).T
+    tilted = _simple_pieces(RECTANGLE, source, x, y, 0.5 * width, 0.5 * height, angle)
+    source, x, y, radius = np.array(discs, dtype=float).reshape(-1, 4).T
+    round_ones = _simple_pieces(DISC, source, x, y, radius, radius)
+    with_corners = join(part for _, part in polygons)
+    with_corners.pieces["source"] = np.repeat([i for i, _ in polygons], [len(part.pieces) for _, part in polygons])
+    return Pieces(
+        np.concatenate([straight, tilted, round_ones, with_corners.pieces]),
+        with_corners.corners,
+    )
+
+
+@lru_cache(maxsize=10_000)
+def polygon_pieces(polygon: Polygon) -> Pieces:
+    """The convex parts of a polygon; kept, since they take their time and worlds share their obstacles."""
+    return _ring_pieces(convex_parts(polygon.to_shapely()))
+
+
+def rectangle_pieces(centers: NDArray[np.float64], sizes: NDArray[np.float64], angle: float = 0.0) -> Pieces:
+    """Pieces of many rectangles that are turned alike.
+
+    Args:
+        centers: shape (n, 2) [m].
+        sizes: shape (n, 2) [m].
+        angle: direction of the first side [rad]; 0 lies exactly along the axes.
+    """
+    x, y = centers.T
+    half_x, half_y = 0.5 * sizes.T
+    angles = np.full(len(centers), angle)
+    pieces = _simple_pieces(RECTANGLE, np.arange(len(centers)), x, y, half_x, half_y, angles)
+    return Pieces(pieces, np.empty(0, dtype=CORNER))
+
+
+def footprint_pieces(footprint: Footprint, center: tuple[float, float]) -> Pieces:
+    """The convex parts of a footprint with corners, about a centre in the robot's frame [m]; none of a round one."""
+    if footprint.vertices is None:
+        return join(())
+    return _ring_pieces([ring - center for ring in convex_parts(shapely.Polygon(footprint.vertices))])
+
+
+def _ring_pieces(rings: list[NDArray[np.float64]]) -> Pieces:
+    """Polygons of rings of corners, each of shape (n, 2) [m]."""
+    counts = [len(ring) for ring in rings]
+    pieces = np.zeros(len(rings), dtype=PIECE)
+    pieces["kind"], pieces["count"], pieces["first"] = POLYGON, counts, np.cumsum([0, *counts[:-1]])
+    pieces["x"], pieces["y"] = np.transpose([ring.mean(axis=0) for ring in rings])
+    return Pieces(pieces, np.concatenate([corner_records(ring) for ring in rings]))
+
+
+def corner_records(ring: NDArray[np.float64]) -> Records:
+    """Records of a convex ring's corners, counter-clockwise, shape (n, 2) to (n,)."""
+    edges = np.roll(ring, -1, axis=0) - ring  # (n, 2)
+    lengths = np.hypot(*edges.T)
+    records = np.empty(len(ring), dtype=CORNER)
+    records["x"], records["y"] = ring.T
+    records["along_x"], records["along_y"] = (edges / lengths[:, None]).T
+    records["length"] = lengths
+    return records
+
+
+def _simple_pieces(
+    kind: int,
+    source: NDArray[Any],
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    half_x: NDArray[np.float64],
+    half_y: NDArray[np.float64],
+    angle: NDArray[np.float64] | float = 0.0,
+) -> Records:
+    """Rectangles or discs, one a row of the arrays, each of shape (n,)."""
+    pieces = np.zeros(len(x), dtype=PIECE)
+    pieces["kind"], pieces["source"], pieces["x"], pieces["y"] = kind, source, x, y
+    pieces["half_x"], pieces["half_y"], pieces["cos"], pieces["sin"] = half_x, half_y, np.cos(angle), np.sin(angle)
+    return pieces
