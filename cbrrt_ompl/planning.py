@@ -13,30 +13,15 @@ from typing import Any
 import numpy as np
 
 from cbrrt_ompl.checks import is_number
-from cbrrt_ompl.errors import Problem, SettingsError, UnknownPlannerError
-from cbrrt_ompl.motion.model import check_step, law_of, make_model
-from cbrrt_ompl.planners.search import COMPILED_PLANNERS, ROBUST, Search
+from cbrrt_ompl.errors import Problem, SettingsError
+from cbrrt_ompl.motion.model import check_step, make_model
+from cbrrt_ompl.planners.registry import PLANNERS, is_compiled, law_of, planner_named
+from cbrrt_ompl.planners.search import Search
 from cbrrt_ompl.planners.warm_up import warm_up
 from cbrrt_ompl.scenario.scenario import Scenario, check_scenario
 from cbrrt_ompl.trajectory.replay import trajectory_from_controls
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.trajectory.tree import Tree
-
-PLANNERS: dict[str, str] = {
-    "cb-rrt": "CB-RRT of the paper: the Kanayama law in OMPL's control::RRT",
-    "s-rrt": "S-RRT, the paper's baseline: full speed, three steering rates; kinematic",
-    "cb-rrt-compiled": "CB-RRT as one compiled loop: the same kernels, many times as fast",
-    "s-rrt-compiled": "S-RRT as one compiled loop",
-    "cb-rrt-robust": "cb-rrt-compiled that passes over nodes extended in vain: for real maps",
-    "rrt": "OMPL's control::RRT with random controls",
-    "kpiece1": "OMPL's KPIECE1",
-    "est": "OMPL's expansive space trees",
-    "sst": "OMPL's stable sparse RRT, ended by its first solution",
-    "pdst": "OMPL's path-directed subdivision tree",
-    "syclop-rrt": "OMPL's Syclop over a 32 x 32 grid, with RRT",
-    "syclop-est": "OMPL's Syclop over a 32 x 32 grid, with EST",
-}
-"""Known planners: name and description."""
 
 SOLVED, TIME_LIMIT, SAMPLE_LIMIT = "solved", "time limit", "sample limit"
 """How a plan ends."""
@@ -95,7 +80,7 @@ def plan(
 
     Args:
         scenario: world, robot, start, goal and settings; its ``max_samples`` ends a plan whatever the time limit.
-        planner: a name from `PLANNERS`.
+        planner: a name from :data:`cbrrt_ompl.planners.registry.PLANNERS`.
         seed: 0 or more; the same seed gives the same result. None draws a fresh one.
         time_limit: largest planning time [s].
         progress: called about ten times a second with the samples so far and the time since the start [s].
@@ -110,15 +95,14 @@ def plan(
         KeyboardInterrupt: on Ctrl-C, at once.
     """
     check_scenario(scenario)
-    if not (isinstance(planner, str) and planner in PLANNERS):
-        raise UnknownPlannerError(planner, list(PLANNERS))
+    planner_named(planner)
     _check_arguments(seed, time_limit, progress)
     check_step(scenario.robot, scenario.planning)
     warm_up_planner(planner)
     watch = _Watch(time_limit, progress)
     if not scenario.goal.violations(scenario.start):
         return _already_there(scenario, planner, seed)
-    if planner in COMPILED_PLANNERS:
+    if is_compiled(planner):
         return _plan_compiled(scenario, planner, seed, watch)
     return _plan_in_ompl(scenario, planner, seed, watch)
 
@@ -126,7 +110,7 @@ def plan(
 def warm_up_planner(planner: str) -> None:
     """Load or compile all kernels that a planner needs, before a clock runs."""
     warm_up()
-    if planner not in COMPILED_PLANNERS:
+    if not is_compiled(planner):
         from cbrrt_ompl.ompl_plugin import warm_up as plugin  # here, so that the compiled planners need no OMPL
 
         plugin.warm_up()
@@ -157,7 +141,7 @@ def _plan_compiled(scenario: Scenario, planner: str, seed: int | None, watch: _W
         seed,
         goal_bias=planning.goal_bias,
         neighbours=planning.nearest_neighbour,
-        robust=planner == ROBUST,
+        robust=PLANNERS[planner].is_robust,
     )
     watch.start()
     search.run(watch.should_stop, planning.max_samples)

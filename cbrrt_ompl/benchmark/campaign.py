@@ -17,10 +17,10 @@ from cbrrt_ompl.benchmark.case import Case, Outcome, check_log, crash_log
 from cbrrt_ompl.benchmark.database import check_replaceable, write_database
 from cbrrt_ompl.benchmark.local import run_locally
 from cbrrt_ompl.benchmark.log import Log, format_log, merge_logs, read_log
-from cbrrt_ompl.errors import CbrrtError, InputError, Problem, SettingsError, UnknownPlannerError
+from cbrrt_ompl.errors import CbrrtError, InputError, Problem, SettingsError
 from cbrrt_ompl.files import write_file
 from cbrrt_ompl.motion.model import check_step
-from cbrrt_ompl.planning import PLANNERS
+from cbrrt_ompl.planners.registry import planner_named
 from cbrrt_ompl.scenario.scenario import Scenario, load_scenario, scenario_to_dict
 
 RUNS_PER_CASE = 10
@@ -55,8 +55,7 @@ class Campaign:
     def __post_init__(self) -> None:
         """Check all values."""
         for planner in self.planners:
-            if planner not in PLANNERS:
-                raise UnknownPlannerError(planner, list(PLANNERS))
+            planner_named(planner)
         for scenario in self.scenarios.values():
             check_step(scenario.robot, scenario.planning)
         problems = [

@@ -15,7 +15,7 @@ from cbrrt_ompl.ompl_plugin.setup import (
     first_solution_objective,
     make_planner,
 )
-from cbrrt_ompl.planners.search import COMPILED_PLANNERS
+from cbrrt_ompl.planners.registry import is_compiled
 from cbrrt_ompl.scenario.scenario import Scenario
 
 
@@ -107,13 +107,13 @@ class Entrant(ob.Planner):  # type: ignore[misc]  # OMPL has no type information
     def _make(self, seed: int) -> Any:
         """A new planner."""
         si, name = self.getSpaceInformation(), self.getName()
-        if name in COMPILED_PLANNERS:
+        if is_compiled(name):
             return CompiledPlanner(si, self._scenario, name, seed)
         return make_planner(si, self._scenario, name)
 
     def _stop_condition(self, condition: Any, end: float) -> Callable[[], bool]:
         """OMPL's condition, the end of the time and, where OMPL does the sampling, the limit of samples."""
-        limit = math.inf if self.getName() in COMPILED_PLANNERS else self._scenario.planning.max_samples
+        limit = math.inf if is_compiled(self.getName()) else self._scenario.planning.max_samples
 
         def should_stop() -> bool:
             if self._rounds >= limit or time.perf_counter() >= end or condition():

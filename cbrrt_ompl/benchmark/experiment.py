@@ -11,13 +11,14 @@ from typing import Any
 from cbrrt_ompl.benchmark.columns import search_columns, trajectory_columns
 from cbrrt_ompl.benchmark.entrant import Entrant
 from cbrrt_ompl.benchmark.log import Log, PlannerLog, read_log
-from cbrrt_ompl.errors import InputError, Problem, SettingsError, UnknownPlannerError
-from cbrrt_ompl.motion.model import CLOSED_LOOP, law_of
+from cbrrt_ompl.errors import InputError, Problem, SettingsError
+from cbrrt_ompl.motion.model import CLOSED_LOOP
 from cbrrt_ompl.ompl_plugin.binding import ot, ou
 from cbrrt_ompl.ompl_plugin.results import trajectory_from_path
 from cbrrt_ompl.ompl_plugin.run import quiet_ompl
 from cbrrt_ompl.ompl_plugin.setup import make_equipped_setup
-from cbrrt_ompl.planning import PLANNERS, plan
+from cbrrt_ompl.planners.registry import law_of, planner_named
+from cbrrt_ompl.planning import plan
 from cbrrt_ompl.scenario.scenario import Scenario
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 
@@ -155,8 +156,7 @@ def check_entries(scenario: Scenario, seeds: Mapping[str, Sequence[int]]) -> Non
         InputError: if there is none, if they differ in their number of runs, or in what steers them.
     """
     for name in seeds:
-        if name not in PLANNERS:
-            raise UnknownPlannerError(name, list(PLANNERS))
+        planner_named(name)
     if len({len(runs) for runs in seeds.values()}) != 1 or not all(seeds.values()):
         raise InputError(Problem("seeds", {name: len(runs) for name, runs in seeds.items()}, "as many runs for all"))
     if len({law_of(name, scenario.planning) == CLOSED_LOOP for name in seeds}) > 1:

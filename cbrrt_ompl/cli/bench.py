@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     from cbrrt_ompl.benchmark.campaign import Campaign, load_scenarios, run_campaign
     from cbrrt_ompl.benchmark.cluster import run_on_cluster
     from cbrrt_ompl.benchmark.local import available_cores, run_locally
-    from cbrrt_ompl.planning import PLANNERS
+    from cbrrt_ompl.planners.registry import PLANNERS
 
     planners = list(dict.fromkeys(arguments.planner or PLANNERS))
     scenarios = load_scenarios(arguments.scenarios)

@@ -23,7 +23,7 @@ def run(arguments: argparse.Namespace) -> int:
     """``cbrrt completion``."""
     import shtab
 
-    from cbrrt_ompl.planning import PLANNERS
+    from cbrrt_ompl.planners.registry import PLANNERS
 
     for action in _actions(arguments.parser):
         if action.type is Path:

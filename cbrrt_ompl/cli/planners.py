@@ -16,10 +16,10 @@ def add_parser(commands: Commands) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """``cbrrt planners``."""
-    from cbrrt_ompl.planning import PLANNERS
+    from cbrrt_ompl.planners.registry import PLANNERS
 
     if arguments.json:
-        print_json(PLANNERS)
+        print_json({name: row.description for name, row in PLANNERS.items()})
     else:
-        print_values(PLANNERS)
+        print_values({name: row.description for name, row in PLANNERS.items()})
     return DONE

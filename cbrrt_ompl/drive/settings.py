@@ -10,8 +10,7 @@ import shapely
 
 from cbrrt_ompl.errors import Problem, SettingsError
 from cbrrt_ompl.motion.kinematics import brake
-from cbrrt_ompl.motion.model import STEERING, law_of
-from cbrrt_ompl.planning import PLANNERS
+from cbrrt_ompl.planners.registry import PLANNERS, Steering
 from cbrrt_ompl.problem.robot import Footprint, Robot
 from cbrrt_ompl.problem.settings import MAX_STEPS, PlanningSettings
 
@@ -59,7 +58,7 @@ class DriveSettings:
             value = getattr(self, name)
             if value is not None and not (isinstance(value, int) and value >= 1):
                 problems.append(Problem(name, value, "a whole number of 1 or more"))
-        known = [name for name in PLANNERS if law_of(name, PlanningSettings()) != STEERING]
+        known = [name for name, row in PLANNERS.items() if row.steering is not Steering.RATES]
         if self.planner not in known:
             problems.append(Problem("planner", self.planner, f"one of {', '.join(known)}"))
         if problems:

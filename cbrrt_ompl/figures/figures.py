@@ -263,7 +263,8 @@ def draw_extension(
         The axes.
     """
     from cbrrt_ompl.motion.control_laws import reference_pose  # here, since a figure of a world needs no kernels
-    from cbrrt_ompl.motion.model import STEERING, law_of, make_model
+    from cbrrt_ompl.motion.model import STEERING, make_model
+    from cbrrt_ompl.planners.registry import law_of
     from cbrrt_ompl.trajectory.replay import extension_trajectories
 
     law = law_of(planner, planning)

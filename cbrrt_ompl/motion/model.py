@@ -119,13 +119,6 @@ def control_dimension(model: Records) -> int:
     return 3 if model["law"][0] == CLOSED_LOOP or model["approaches"][0] else 2
 
 
-def law_of(planner: str, planning: PlanningSettings) -> int:
-    """How a planner drives: `STEERING`, `CLOSED_LOOP` or `OPEN_LOOP` (as OMPL's own planners do)."""
-    if planner.startswith("s-rrt"):
-        return STEERING
-    return CLOSED_LOOP if planner.startswith("cb-rrt") and planning.closed_loop else OPEN_LOOP
-
-
 def check_step(robot: Robot, planning: PlanningSettings) -> None:
     """Refuse a step that is too long for the integrator.
 

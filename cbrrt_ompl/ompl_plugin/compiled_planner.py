@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.motion.model import law_of, make_model
+from cbrrt_ompl.motion.model import make_model
 from cbrrt_ompl.ompl_plugin.binding import ob, oc
 from cbrrt_ompl.ompl_plugin.reals import StateReals
 from cbrrt_ompl.ompl_plugin.space import STATE_DIMENSION, set_state
-from cbrrt_ompl.planners.search import ROBUST, Search
+from cbrrt_ompl.planners.registry import planner_named
+from cbrrt_ompl.planners.search import Search
 from cbrrt_ompl.problem.settings import State
 from cbrrt_ompl.scenario.scenario import Scenario
 
@@ -39,8 +40,9 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
         super().__init__(si, name)
         self.search: Search | None = None
         self._scenario = scenario
-        self._model = make_model(law_of(name, scenario.planning), scenario.robot, scenario.goal, scenario.planning)
-        self._is_robust = name == ROBUST
+        row = planner_named(name)
+        self._model = make_model(row.law(scenario.planning), scenario.robot, scenario.goal, scenario.planning)
+        self._is_robust = row.is_robust
         self._seed = seed
 
     def clear(self) -> None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from cbrrt_ompl.errors import UnknownPlannerError
-from cbrrt_ompl.motion.model import CLOSED_LOOP, check_step, law_of, make_model
+from cbrrt_ompl.motion.model import CLOSED_LOOP, check_step, make_model
 from cbrrt_ompl.motion.records import Records
 from cbrrt_ompl.ompl_plugin.binding import ob, oc
+from cbrrt_ompl.ompl_plugin.compiled_planner import CompiledPlanner
 from cbrrt_ompl.ompl_plugin.decomposition import PositionDecomposition
 from cbrrt_ompl.ompl_plugin.goals import make_goal
 from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
@@ -20,37 +19,18 @@ from cbrrt_ompl.ompl_plugin.samplers import (
 )
 from cbrrt_ompl.ompl_plugin.space import make_control_space, make_reference_space, make_state_space, set_state
 from cbrrt_ompl.ompl_plugin.validity import FclStateValidityChecker
-from cbrrt_ompl.planners.search import COMPILED_PLANNERS
+from cbrrt_ompl.planners.registry import Backend, Steering, planner_named
 from cbrrt_ompl.scenario.scenario import Scenario, check_scenario
-
-SAMPLERS: dict[str, type[ExtensionSampler]] = {
-    "cb-rrt": KanayamaDirectedControlSampler,
-    "s-rrt": SteeringDirectedControlSampler,
-}
-"""Planners of the paper: control::RRT with a directed sampler of ours."""
-
 
 FREE_VOLUME_SAMPLES = 8192
 """States by which Syclop estimates the free volume of its cells before it looks at the clock: 8 a cell, not 98."""
 
 
-def _syclop(planner: Any, si: Any, scenario: Scenario) -> Any:
-    """A Syclop planner that keeps a time limit of a tenth of a second."""
-    made = planner(si, PositionDecomposition(scenario.world.bounds))
-    made.setNumFreeVolumeSamples(FREE_VOLUME_SAMPLES)
-    return made
-
-
-OMPL_PLANNERS: dict[str, Callable[[Any, Scenario], Any]] = {
-    "rrt": lambda si, _: oc.RRT(si),
-    "kpiece1": lambda si, _: oc.KPIECE1(si),
-    "est": lambda si, _: oc.EST(si),
-    "sst": lambda si, _: oc.SST(si),
-    "pdst": lambda si, _: oc.PDST(si),
-    "syclop-rrt": lambda si, s: _syclop(oc.SyclopRRT, si, s),
-    "syclop-est": lambda si, s: _syclop(oc.SyclopEST, si, s),
+SAMPLERS: dict[Steering, type[ExtensionSampler]] = {
+    Steering.KANAYAMA: KanayamaDirectedControlSampler,
+    Steering.RATES: SteeringDirectedControlSampler,
 }
-"""OMPL's own planners, with their own samplers and settings (but Syclop's above), on the dynamic motion model."""
+"""The directed samplers of the planners that OMPL's control::RRT runs for us."""
 
 
 @dataclass
@@ -94,13 +74,11 @@ def make_equipped_setup(scenario: Scenario, planner: str = "cb-rrt") -> tuple[An
         planner: see :func:`make_setup`.
     """
     check_scenario(scenario)
-    known = [*SAMPLERS, *COMPILED_PLANNERS, *OMPL_PLANNERS]
-    if not (isinstance(planner, str) and planner in known):
-        raise UnknownPlannerError(planner, known)
+    row = planner_named(planner)
     check_step(scenario.robot, scenario.planning)
     limits, bounds = scenario.robot.limits, scenario.world.bounds
     space = make_state_space(bounds, limits)
-    if law_of(planner, scenario.planning) == CLOSED_LOOP:
+    if row.law(scenario.planning) == CLOSED_LOOP:
         setup = oc.SimpleSetup(make_reference_space(space, bounds))
     else:
         setup = oc.SimpleSetup(make_control_space(space, limits, scenario.planning.approaches(scenario.goal)))
@@ -128,12 +106,12 @@ def equip(si: Any, space: Any, scenario: Scenario, planner: str) -> Equipment:
         scenario: robot, goal and settings.
         planner: a known planner's name.
     """
-    law = law_of(planner, scenario.planning)
-    equipment = Equipment(make_model(law, scenario.robot, scenario.goal, scenario.planning))
+    row = planner_named(planner)
+    equipment = Equipment(make_model(row.law(scenario.planning), scenario.robot, scenario.goal, scenario.planning))
     si.setStatePropagator(TwoWheelPropagator(si, space, equipment.model))
     si.clearDirectedSamplerAllocator()
-    if planner in SAMPLERS:
-        sampler_class, scene = SAMPLERS[planner], scenario.world.scene(scenario.robot.footprint)
+    if row.backend is Backend.PLUGIN:
+        sampler_class, scene = SAMPLERS[row.steering], scenario.world.scene(scenario.robot.footprint)
 
         def allocate(owner: Any) -> ExtensionSampler:
             equipment.sampler = sampler_class(owner, space, equipment.model, scene)
@@ -151,15 +129,16 @@ def make_planner(si: Any, scenario: Scenario, planner: str) -> Any:
         scenario: bounds (for Syclop's grid), goal bias, and all that the compiled planners plan for.
         planner: a known planner's name.
     """
-    if planner in COMPILED_PLANNERS:
-        from cbrrt_ompl.ompl_plugin.compiled_planner import CompiledPlanner  # here, since it builds on this package
-
+    row = planner_named(planner)
+    if row.backend is Backend.COMPILED:
         return CompiledPlanner(si, scenario, planner)
-    if planner in SAMPLERS:
-        made = oc.RRT(si)
-        made.setGoalBias(scenario.planning.goal_bias)
+    if row.ompl_class.startswith("Syclop"):
+        made = getattr(oc, row.ompl_class)(si, PositionDecomposition(scenario.world.bounds))
+        made.setNumFreeVolumeSamples(FREE_VOLUME_SAMPLES)
     else:
-        made = OMPL_PLANNERS[planner](si, scenario)
+        made = getattr(oc, row.ompl_class)(si)
+    if row.backend is Backend.PLUGIN:
+        made.setGoalBias(scenario.planning.goal_bias)
     made.setName(planner)
     return made
 

@@ -48,7 +48,7 @@ class Extension(NamedTuple):
     """Control for :func:`cbrrt_ompl.motion.model.advance`."""
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")  # as a function of its own it would be optimised again in each caller
 def extend(
     node: tuple[float, float, float, float, float],
     margin: tuple[float, bool],
@@ -118,7 +118,7 @@ def is_refused(first_child: int, children: Records, v: float, omega: float, tole
     return False
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def approach(
     node: tuple[float, float, float, float, float],
     margin: tuple[float, bool],

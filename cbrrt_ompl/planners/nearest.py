@@ -221,20 +221,23 @@ def nearest(index: Index, x: float, y: float, nodes: int, most_failures: float) 
 def _nearest_in_grid(index: Index, x: float, y: float, most_failures: float) -> int:
     """Search the rows of cells outwards, and in each row its occupied cells outwards, as far as they can be nearer."""
     row, column = _cell_of(index, x, y)
-    rows = len(index.heads)
-    best, node = _nearest_in_row(index, x, y, row, column, 0.0, math.inf, -1, most_failures)
-    for offset in range(1, rows):
-        above = index.y_min + (row + offset) * index.height - y  # of the rows' near edges
-        below = y - index.y_min - (row - offset + 1) * index.height
-        is_above = row + offset < rows and above * above < best
-        is_below = row - offset >= 0 and below * below < best
-        if not (is_above or is_below):
-            break
-        if is_above:
-            best, node = _nearest_in_row(index, x, y, row + offset, column, above * above, best, node, most_failures)
-        if is_below and below * below < best:
-            best, node = _nearest_in_row(index, x, y, row - offset, column, below * below, best, node, most_failures)
-    return node
+    best, node = math.inf, row - row - 1  # no literal, for which all would be compiled twice
+    above = below = row  # the next rows on either side
+    while True:
+        gap_above = max(index.y_min + above * index.height - y, 0.0)
+        gap_below = max(y - index.y_min - (below + 1) * index.height, 0.0)
+        is_above = above < len(index.heads) and gap_above * gap_above < best
+        is_below = below >= 0 and gap_below * gap_below < best
+        if is_above and (not is_below or gap_above <= gap_below):
+            here, gap = above, gap_above
+            below -= above == row  # the first row is both
+            above += 1
+        elif is_below:
+            here, gap = below, gap_below
+            below -= 1
+        else:
+            return node
+        best, node = _nearest_in_row(index, x, y, here, column, gap * gap, best, node, most_failures)
 
 
 @njit(cache=True, forceinline=True)

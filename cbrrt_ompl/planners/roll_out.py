@@ -230,7 +230,7 @@ def roll_out(
     return driven, MOTION_BLOCKED if is_manoeuvring else MOTION_FREE, state_at(steps, 0)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def roll_out_brake_safe(
     node: tuple[float, float, float, float, float],
     control: tuple[float, float, float],
@@ -250,7 +250,7 @@ def roll_out_brake_safe(
     unchecked = driven
     if not model.keep_cut:  # the end first: it is the likeliest to be refused
         unchecked -= 1
-        if not can_brake(end, -1.0, False, scene, model, steps)[0]:
+        if not can_brake(end, -margin, any_heading, scene, model, steps)[0]:
             return 0, MOTION_BLOCKED, node
     frame, state = scene.frame[0], node
     for k in range(unchecked):
@@ -278,7 +278,7 @@ def can_brake(
 
     Args:
         state: (x, y, theta, v, omega).
-        margin: what is known of its pose's margin [m]; negative where nothing is.
+        margin: what is known of its pose's margin [m]; 0 or less where nothing is.
         any_heading: of that margin.
         scene: see :func:`roll_out`.
         model: see :func:`roll_out`.

@@ -38,12 +38,6 @@ PAUSE = 0.002
 FIRST_CAPACITY = 256
 """Nodes that a search has room for at first; doubled when full."""
 
-ROBUST = "cb-rrt-robust"
-"""Name of the planner whose search is robust."""
-
-COMPILED_PLANNERS = ("cb-rrt-compiled", "s-rrt-compiled", ROBUST)
-"""Planners that are one compiled loop and need no OMPL."""
-
 
 class Search:
     """One tree, grown by the compiled loop.
