@@ -64,6 +64,8 @@ class Index(NamedTuple):
     """Grid: first place of each cell, shape (rows, columns)."""
     words: NDArray[np.uint64]
     """Grid: a bit for each cell that holds a place, shape (rows, columns / WORD)."""
+    row_words: NDArray[np.uint64]
+    """Grid: a bit for each row that holds a place, shape (rows / WORD,)."""
     stack: NDArray[np.float64]
     """K-d tree: room for a search, rows of (place, axis, squared distance of its half plane), shape (m, 3)."""
     x_min: float
@@ -72,6 +74,8 @@ class Index(NamedTuple):
     width: float
     """Sides of a cell [m]."""
     height: float
+    columns_per_metre: float
+    rows_per_metre: float
 
 
 def make_index(kind: int, bounds: Bounds, capacity: int, depth: int = 0) -> Index:
@@ -93,10 +97,13 @@ def make_index(kind: int, bounds: Bounds, capacity: int, depth: int = 0) -> Inde
         record_array(1, INDEX_STATE),
         np.empty((rows, cells), dtype=np.int32),
         np.zeros((rows, cells // WORD), dtype=np.uint64),
+        np.zeros(rows // WORD, dtype=np.uint64),
         np.empty((2 * depth + WORD if kind == KD_TREE else 0, 3)),
         *bounds.min,
         bounds.size[0] / cells,
         bounds.size[1] / cells,
+        cells / bounds.size[0],
+        cells / bounds.size[1],
     )
 
 
@@ -152,8 +159,8 @@ def leave_out(index: Index, node: int) -> None:
 def _cell_of(index: Index, x: float, y: float) -> tuple[int, int]:
     """Row and column of a position; positions outside fall into the nearest cell."""
     rows, columns = index.heads.shape
-    column = int(min(max((x - index.x_min) / index.width, 0.0), columns - 1.0))
-    row = int(min(max((y - index.y_min) / index.height, 0.0), rows - 1.0))
+    column = int(min(max((x - index.x_min) * index.columns_per_metre, 0.0), columns - 1.0))
+    row = int(min(max((y - index.y_min) * index.rows_per_metre, 0.0), rows - 1.0))
     return row, column
 
 
@@ -167,6 +174,7 @@ def _insert_into_grid(index: Index, node: int) -> None:
     place.left = index.heads[row, column] if is_taken else -1
     index.heads[row, column] = node
     index.words[row, word] |= bit
+    index.row_words[row // WORD] |= np.uint64(1) << np.uint64(row % WORD)
 
 
 @njit(cache=True)
@@ -221,23 +229,42 @@ def nearest(index: Index, x: float, y: float, nodes: int, most_failures: float) 
 def _nearest_in_grid(index: Index, x: float, y: float, most_failures: float) -> int:
     """Search the rows of cells outwards, and in each row its occupied cells outwards, as far as they can be nearer."""
     row, column = _cell_of(index, x, y)
+    rows = len(index.heads)
     best, node = math.inf, row - row - 1  # no literal, for which all would be compiled twice
-    above = below = row  # the next rows on either side
+    above, below = _next_row(index.row_words, row), _last_row(index.row_words, row - 1)
     while True:
-        gap_above = max(index.y_min + above * index.height - y, 0.0)
-        gap_below = max(y - index.y_min - (below + 1) * index.height, 0.0)
-        is_above = above < len(index.heads) and gap_above * gap_above < best
-        is_below = below >= 0 and gap_below * gap_below < best
-        if is_above and (not is_below or gap_above <= gap_below):
-            here, gap = above, gap_above
-            below -= above == row  # the first row is both
-            above += 1
-        elif is_below:
-            here, gap = below, gap_below
-            below -= 1
-        else:
+        gap_above = (index.y_min + above * index.height - y if above > row else 0.0) if above < rows else math.inf
+        gap_below = y - index.y_min - (below + 1) * index.height if below >= 0 else math.inf
+        gap = min(gap_above, gap_below)
+        if gap * gap >= best:
             return node
+        if gap_above <= gap_below:
+            here, above = above, _next_row(index.row_words, above + 1)
+        else:
+            here, below = below, _last_row(index.row_words, below - 1)
         best, node = _nearest_in_row(index, x, y, here, column, gap * gap, best, node, most_failures)
+
+
+@njit(cache=True, inline="always")
+def _next_row(row_words: NDArray[np.uint64], row: int) -> int:
+    """The first row from one on that holds a place, or the number of rows."""
+    word = row // WORD
+    bits = row_words[word] & (~np.uint64(0) << np.uint64(row % WORD)) if word < len(row_words) else np.uint64(0)
+    while bits == 0 and word + 1 < len(row_words):
+        word += 1
+        bits = row_words[word]
+    return word * WORD + lowest_bit(bits) if bits != 0 else len(row_words) * WORD
+
+
+@njit(cache=True, inline="always")
+def _last_row(row_words: NDArray[np.uint64], row: int) -> int:
+    """The last row up to one that holds a place, or -1."""
+    word = row // WORD  # -1 below the first row
+    bits = row_words[word] & (~np.uint64(0) >> np.uint64(WORD - 1 - row % WORD)) if row >= 0 else np.uint64(0)
+    while bits == 0 and word > 0:
+        word -= 1
+        bits = row_words[word]
+    return word * WORD + highest_bit(bits) if bits != 0 else -1
 
 
 @njit(cache=True, forceinline=True)
@@ -278,7 +305,7 @@ def _nearest_in_row(
             cells = words[word]
             continue
         c = word * WORD + lowest_bit(cells)
-        gap = max(index.x_min + c * index.width - x, 0.0)
+        gap = index.x_min + c * index.width - x if c > column else 0.0
         is_near = gap * gap + squared_gap < best
         if is_near:
             best, node = _nearest_in_cell(index, index.heads[row, c], x, y, best, node, most_failures)
@@ -293,7 +320,7 @@ def _nearest_in_row(
             continue
         place = highest_bit(cells)
         c = word * WORD + place
-        gap = max(x - index.x_min - (c + 1) * index.width, 0.0)
+        gap = x - index.x_min - (c + 1) * index.width
         is_near = gap * gap + squared_gap < best
         if is_near:
             best, node = _nearest_in_cell(index, index.heads[row, c], x, y, best, node, most_failures)
