@@ -9,13 +9,13 @@ from numba import types
 from numba.extending import intrinsic, overload
 
 
-def lowest_bit(word: int) -> int:
+def lowest_bit(word: Any) -> int:
     """Place of the lowest bit that is set; the word must not be 0."""
     word = int(word)
     return (word & -word).bit_length() - 1
 
 
-def highest_bit(word: int) -> int:
+def highest_bit(word: Any) -> int:
     """Place of the highest bit that is set; the word must not be 0."""
     return int(word).bit_length() - 1
 
