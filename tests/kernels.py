@@ -1,4 +1,4 @@
-"""Kernels as tests call them: the Python behind one, and extensions of the paper's robot, all questions answered."""
+"""Kernels as tests call them: the Python behind one, and extensions of the paper's robot."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from cbrrt_ompl.collision.clearance_map import ClearanceMap
-from cbrrt_ompl.collision.motion_check import ASK
+from cbrrt_ompl.collision.scene import Scene
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.motion.kinematics import unicycle_step
-from cbrrt_ompl.motion.model import CLOSED_LOOP, OPEN_LOOP, STEERING, pack_model, unpack_model
-from cbrrt_ompl.planners.extension import Extension, extend
-from cbrrt_ompl.planners.roll_out import SCRATCH_SHAPE, roll_out
+from cbrrt_ompl.motion.model import CLOSED_LOOP, OPEN_LOOP, STEERING, make_model
+from cbrrt_ompl.motion.records import Record, Records, record_array
+from cbrrt_ompl.planners.extension import CHILD, Extension, extend
+from cbrrt_ompl.planners.roll_out import STEPS, margin_at, roll_out
 from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, OrientedBox, Polygon
 from cbrrt_ompl.problem.robot import Footprint, Limits, Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
@@ -32,7 +32,7 @@ FOOTPRINTS = {
     "disc": Footprint.disc(0.15),
     "rectangle": Footprint.polygon([(-0.2, -0.1), (0.3, -0.1), (0.3, 0.1), (-0.2, 0.1)]),
 }
-WIDE = ClearanceMap(World(Bounds((-100.0, -100.0), (100.0, 100.0))), POINT)
+WIDE = World(Bounds((-100.0, -100.0), (100.0, 100.0))).scene(POINT)
 
 coordinates = st.floats(-2.0, 2.0)
 headings = st.floats(-math.pi, math.pi, exclude_max=True)
@@ -45,76 +45,54 @@ def plain(kernel: Callable[..., Any]) -> Callable[..., Any]:
     return getattr(kernel, "py_func", kernel)  # with NUMBA_DISABLE_JIT=1 a kernel is that function itself
 
 
-def model_of(law: int = OPEN_LOOP, goal: Goal = OUT_OF_REACH, **planning: Any) -> NDArray[np.float64]:
-    """The paper's robot as a packed model."""
-    return pack_model(law, Robot(), goal, PlanningSettings(**planning))
+def record_of(records: Records) -> Record:
+    """The only one of some records, its fields attributes in Python too."""
+    (record,) = records.view(np.recarray)
+    return record
+
+
+def model_of(law: int = OPEN_LOOP, goal: Goal = OUT_OF_REACH, **planning: Any) -> Records:
+    """The paper's robot as the kernels' model."""
+    return make_model(law, Robot(), goal, PlanningSettings(**planning))
 
 
 def drive(
-    clearance_map: ClearanceMap,
+    scene: Scene,
     node: Sequence[float],
     sample: tuple[float, float],
-    model: NDArray[np.float64],
+    model: Records,
     children: Sequence[tuple[float, float]] = (),
     kernel: Callable[..., Extension] = extend,
 ) -> Extension:
-    """One extension, all its questions answered; ``children`` are the commands that the node has used."""
-    following = np.arange(-1, len(children), dtype=np.int32)
-    commands = np.array([*children, (0.0, 0.0)])
-    node = tuple(map(float, node))
-    clearance_map.forget_findings()
-    for _ in range(10_000):
-        found = kernel(
-            node,
-            *sample,
-            len(children) - 1,
-            following,
-            commands,
-            unpack_model(model),
-            clearance_map.view,
-            clearance_map.findings,
-            np.empty(SCRATCH_SHAPE),
-        )
-        if found.outcome != ASK:
-            return found
-        clearance_map.answer(*found.control)
-    raise AssertionError("there is no end to the questions")
+    """One extension; ``children`` are the commands that the node has used."""
+    used = record_array(len(children) + 1, CHILD)
+    for child, (v, omega) in enumerate(children):
+        used[child] = v, omega, child - 1, 0
+    state, scene = tuple(map(float, node)), Scene(*(records.view(np.recarray) for records in scene))
+    margin = margin_at(*state[:3], scene, model["room"][0])
+    steps = record_of(record_array(1, STEPS))
+    return kernel(state, margin, sample, len(children) - 1, used, scene, record_of(model), steps)
 
 
-def roll_out_answered(
-    clearance_map: ClearanceMap,
-    node: Sequence[float],
-    control: tuple[float, float, float],
-    model: NDArray[np.float64],
+def roll_out_free(
+    scene: Scene, node: Sequence[float], control: tuple[float, float, float], model: Records
 ) -> tuple[int, int, tuple[float, ...]]:
-    """Steps, outcome and last state of a drive under one control, all its questions answered."""
-    scratch = np.empty(SCRATCH_SHAPE)
-    clearance_map.forget_findings()
-    for _ in range(10_000):
-        steps, outcome, state, pose = roll_out(
-            tuple(map(float, node)), control, unpack_model(model), clearance_map.view, clearance_map.findings, scratch
-        )
-        if outcome != ASK:
-            return steps, outcome, state
-        clearance_map.answer(*pose)
-    raise AssertionError("there is no end to the questions")
+    """Steps, outcome and last state of a drive under one control."""
+    state, steps = tuple(map(float, node)), record_of(record_array(1, STEPS))
+    margin = margin_at(*state[:3], scene, model["room"][0])
+    return roll_out(state, control, *margin, scene, record_of(model), steps)
 
 
-def findings(clearance_map: ClearanceMap) -> list[list[float]]:
-    """What was found about the present motion: rows of (margin, whether for every heading)."""
-    return clearance_map.findings[1 : 1 + int(clearance_map.findings[0, 0])].tolist()
-
-
-def states_of(node: Sequence[float], found: Extension, model: NDArray[np.float64]) -> NDArray[np.float64]:
+def states_of(node: Sequence[float], found: Extension, model: Records) -> NDArray[np.float64]:
     """States of an extension from its node on, shape (steps + 1, 5)."""
     return replay_path(np.array(node, dtype=float), np.array([found.control]), np.array([found.steps]), model)[0]
 
 
-def between(a: NDArray[np.float64], b: NDArray[np.float64], share: float, model: NDArray[np.float64]) -> list[float]:
+def between(a: NDArray[np.float64], b: NDArray[np.float64], share: float, model: Records) -> list[float]:
     """Pose at a share of the step between two states."""
-    v, omega = b[3:] if int(model[0]) == STEERING else a[3:]
+    v, omega = b[3:] if model["law"][0] == STEERING else a[3:]
     v_there, omega_there = v + share * (b[3] - v), omega + share * (b[4] - omega)
-    return list(unicycle_step(*a[:3], v, omega, v_there, omega_there, share * model[1]))
+    return list(unicycle_step(*a[:3], v, omega, v_there, omega_there, share * model["dt"][0]))
 
 
 def crowded_world() -> World:

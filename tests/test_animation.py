@@ -110,7 +110,7 @@ def test_an_animated_drive_shows_the_braking_that_is_ready(driven: DriveResult) 
         x, y = (np.asarray(values) for values in line.get_data())
         np.testing.assert_allclose([x[0], y[0]], driven.trajectory.at(times[frame])[0, :2])
         assert len(x) > 1
-        collides = driven.world.checker(driven.scenario.robot.footprint).collides
+        collides = driven.world.referee(driven.scenario.robot.footprint).collides
         assert not any(collides(a, b, 0.0) for a, b in zip(x.tolist(), y.tolist(), strict=True))
 
 

@@ -21,28 +21,29 @@ from kernels import (
     model_of,
     nodes,
     plain,
+    record_of,
     samples,
     states_of,
 )
 
-from cbrrt_ompl.collision.clearance_map import ClearanceMap
-from cbrrt_ompl.collision.motion_check import BLOCKED
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.motion.control_laws import reference_pose, tracking_command
 from cbrrt_ompl.motion.kinematics import dynamic_step
-from cbrrt_ompl.motion.model import CLOSED_LOOP, OPEN_LOOP, STEERING, in_goal, unpack_model
-from cbrrt_ompl.planners.extension import EXTENDED, REFUSED, extend, is_refused
+from cbrrt_ompl.motion.model import CLOSED_LOOP, OPEN_LOOP, STEERING, in_goal
+from cbrrt_ompl.motion.records import as_records
+from cbrrt_ompl.planners.extension import BLOCKED, CHILD, EXTENDED, REFUSED, extend, is_refused
 from cbrrt_ompl.problem.obstacles import Bounds, Box
 from cbrrt_ompl.problem.robot import Footprint, Gains
 from cbrrt_ompl.problem.settings import Goal, State
 
 
 class TestRefusal:
-    FOLLOWING = np.array([-1, 0, -1, 1], dtype=np.int32)  # the children 3, 1, 0 of one node; 2 of another
-    COMMANDS = np.array([(0.5, 0.25), (1.0, -0.5), (0.0, 0.5), (0.0, 0.0)])
+    CHILDREN = as_records(  # 3, 1, 0 of one node; 2 of another
+        np.array([(0.5, 0.25, -1, 0), (1.0, -0.5, 0, 0), (0.0, 0.5, -1, 0), (0.0, 0.0, 1, 0)], dtype=CHILD)
+    )
 
     def refused(self, v: float, omega: float, tolerance: float, first: int = 3) -> bool:
-        return bool(is_refused(first, self.FOLLOWING, self.COMMANDS, v, omega, tolerance))
+        return bool(is_refused(first, self.CHILDREN, v, omega, tolerance))
 
     def test_the_tolerance_itself_is_still_refused(self) -> None:
         assert self.refused(0.75, 0.25, 0.25)
@@ -138,7 +139,7 @@ class TestWayOfAnExtension:
             found = drive(WIDE, node, sample, model, [(1.0, rate) for rate in RATES if rate != free.command[1]])
         else:
             found = drive(WIDE, node, sample, model)
-        region = unpack_model(model).goal
+        region = record_of(model).goal
         inside = [k for k in range(1, 41) if in_goal(region, *states[k])]
         assert (found.outcome, found.steps) == (EXTENDED, inside[0])
         assert found.state == tuple(states[inside[0]])
@@ -180,9 +181,9 @@ class TestSteering:
         obstacles = [Box((0.5, 0.15), (1.5, 1.0)), Box((1.9, -0.1), (2.5, 0.1)), Box((0.5, -1.0), (1.5, -0.15))]
         bounds = Bounds((-5.0, -5.0), (5.0, 5.0))
         for count, expected in ((1, RATES[1]), (2, RATES[0])):
-            found = drive(ClearanceMap(World(bounds, obstacles[:count]), POINT), node, sample, model_of(STEERING))
+            found = drive(World(bounds, obstacles[:count]).scene(POINT), node, sample, model_of(STEERING))
             assert (found.outcome, found.command[1]) == (EXTENDED, expected)
-        closed = ClearanceMap(World(bounds, obstacles), POINT)
+        closed = World(bounds, obstacles).scene(POINT)
         assert drive(closed, node, sample, model_of(STEERING)).outcome == BLOCKED
 
 
@@ -193,27 +194,27 @@ class TestObstacles:
     @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
     @pytest.mark.parametrize("footprint", FOOTPRINTS.values(), ids=FOOTPRINTS)
     def test_a_cut_extension_is_discarded_or_kept_up_to_the_obstacle(self, law: int, footprint: Footprint) -> None:
-        clearance_map, sample = ClearanceMap(self.BOX, footprint), (4.0, 0.0)
+        scene, sample = self.BOX.scene(footprint), (4.0, 0.0)
         others = [(1.0, RATES[0]), (1.0, RATES[2])]
-        assert drive(clearance_map, self.AT_SPEED, sample, model_of(law), others).outcome == BLOCKED
-        kept = drive(clearance_map, self.AT_SPEED, sample, model_of(law, cut_extension="keep"), others)
+        assert drive(scene, self.AT_SPEED, sample, model_of(law), others).outcome == BLOCKED
+        kept = drive(scene, self.AT_SPEED, sample, model_of(law, cut_extension="keep"), others)
         assert kept.outcome == EXTENDED
         reach = 1.0 - {"point": 0.0, "disc": 0.15, "polygon": 0.3}[footprint.kind]
         assert reach - 0.05 - 1e-5 < kept.state[0] < reach
 
     def test_an_extension_that_cannot_do_its_first_step_is_never_kept(self) -> None:
-        clearance_map = ClearanceMap(self.BOX, POINT)
+        scene = self.BOX.scene(POINT)
         node = (0.98, 0.0, 0.0, 1.0, 0.0)
-        assert drive(clearance_map, node, (4.0, 0.0), model_of(cut_extension="keep")).outcome == BLOCKED
+        assert drive(scene, node, (4.0, 0.0), model_of(cut_extension="keep")).outcome == BLOCKED
 
     def test_a_goal_before_the_obstacle_saves_the_extension(self) -> None:
-        clearance_map = ClearanceMap(self.BOX, POINT)
-        found = drive(clearance_map, self.AT_SPEED, (4.0, 0.0), model_of(goal=Goal(0.9, 0.0, 0.08)))
+        scene = self.BOX.scene(POINT)
+        found = drive(scene, self.AT_SPEED, (4.0, 0.0), model_of(goal=Goal(0.9, 0.0, 0.08)))
         assert (found.outcome, found.state[0]) == (EXTENDED, pytest.approx(0.85))
 
     def test_a_goal_behind_the_obstacle_does_not(self) -> None:
-        clearance_map = ClearanceMap(self.BOX, POINT)
-        found = drive(clearance_map, self.AT_SPEED, (4.0, 0.0), model_of(goal=Goal(1.7, 0.0, 0.1)))
+        scene = self.BOX.scene(POINT)
+        found = drive(scene, self.AT_SPEED, (4.0, 0.0), model_of(goal=Goal(1.7, 0.0, 0.1)))
         assert found.outcome == BLOCKED
 
     def test_a_turn_on_the_spot_sweeps_the_corners_of_the_footprint(self) -> None:
@@ -221,9 +222,9 @@ class TestObstacles:
         world = World(Bounds((-5.0, -5.0), (5.0, 5.0)), [Box((-3.0, 0.3), (3.0, 0.4))])
         long = Footprint.polygon([(-0.5, -0.1), (0.5, -0.1), (0.5, 0.1), (-0.5, 0.1)])
         node, sample = (0.0, 0.0, 0.0, 0.0, 0.0), (-2.0, -1.0)
-        assert drive(ClearanceMap(world, POINT), node, sample, model_of()).outcome == EXTENDED
-        assert drive(ClearanceMap(world, long), node, sample, model_of()).outcome == BLOCKED
-        kept = drive(ClearanceMap(world, long), node, sample, model_of(cut_extension="keep"))
+        assert drive(world.scene(POINT), node, sample, model_of()).outcome == EXTENDED
+        assert drive(world.scene(long), node, sample, model_of()).outcome == BLOCKED
+        kept = drive(world.scene(long), node, sample, model_of(cut_extension="keep"))
         assert kept.state[:2] == (0.0, 0.0)
         assert kept.state[2] == pytest.approx(math.asin(0.1 / 0.26**0.5) - math.asin(0.3 / 0.26**0.5), abs=0.027)
 
@@ -231,11 +232,11 @@ class TestObstacles:
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_compiled_and_plain_kernels_agree(law: int) -> None:
     world, rng = crowded_world(), np.random.default_rng(16)
-    clearance_map = ClearanceMap(world, FOOTPRINTS["rectangle"])
+    scene = world.scene(FOOTPRINTS["rectangle"])
     for node in free_nodes(world, FOOTPRINTS["rectangle"], 20, seed=17):
         sample = tuple(rng.uniform(-2.0, 2.0, 2).tolist())
         compiled, python = (
-            drive(clearance_map, node, sample, model_of(law), kernel=kernel) for kernel in (extend, plain(extend))
+            drive(scene, node, sample, model_of(law), kernel=kernel) for kernel in (extend, plain(extend))
         )
         assert compiled[:2] == python[:2]
         assert compiled.state == pytest.approx(python.state, abs=1e-14)

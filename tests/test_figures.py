@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from kernels import OUT_OF_REACH, WIDE, drive
+from kernels import WIDE, drive, model_of
 from matplotlib import pyplot
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection, PolyCollection
@@ -34,7 +34,7 @@ from cbrrt_ompl.figures.figures import (
     draw_velocities,
     draw_world,
 )
-from cbrrt_ompl.motion.model import OPEN_LOOP, STEERING, pack_model
+from cbrrt_ompl.motion.model import OPEN_LOOP, STEERING
 from cbrrt_ompl.planning import PlanResult
 from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, Obstacle, Polygon
 from cbrrt_ompl.problem.robot import Footprint, Limits, Robot
@@ -293,7 +293,7 @@ class TestExtension:
 
     def test_it_starts_at_the_node_and_ends_where_the_planner_would(self, ax: Axes) -> None:
         assert draw_extension(ax, self.NODE, self.SAMPLE, Robot(), PlanningSettings()) is ax
-        found = drive(WIDE, self.NODE, self.SAMPLE, pack_model(OPEN_LOOP, Robot(), OUT_OF_REACH, PlanningSettings()))
+        found = drive(WIDE, self.NODE, self.SAMPLE, model_of(OPEN_LOOP))
         np.testing.assert_array_equal(points(ax, "node"), [self.NODE[:2]])
         np.testing.assert_allclose(points(ax, "motion")[0], self.NODE[:2])
         np.testing.assert_allclose(points(ax, "motion")[-1], found.state[:2], atol=1e-12)
@@ -315,7 +315,7 @@ class TestExtension:
 
     def test_s_rrt_has_three_choices_and_takes_the_one_that_ends_nearest(self, ax: Axes) -> None:
         draw_extension(ax, self.NODE, self.SAMPLE, Robot(), PlanningSettings(), "s-rrt")
-        found = drive(WIDE, self.NODE, self.SAMPLE, pack_model(STEERING, Robot(), OUT_OF_REACH, PlanningSettings()))
+        found = drive(WIDE, self.NODE, self.SAMPLE, model_of(STEERING))
         np.testing.assert_allclose(points(ax, "motion")[-1], found.state[:2], atol=1e-12)
         left_out = [drawn for drawn in ax.lines if drawn.get_label() == "left out"]
         assert len(left_out) == 2

@@ -6,24 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from cbrrt_ompl.collision.clearance_map import (
-    COLLISION,
-    GOOD_MARGIN,
-    ROOM,
-    SMALLEST_CELL,
-    UNDECIDED,
-    ClearanceMap,
-    certify,
-    certify_pose,
-    find_leaf,
-)
-from cbrrt_ompl.collision.disc_tree import disc_tree
 from hypothesis import given
 from hypothesis import strategies as st
-from kernels import findings
 from strategies import SHARES, WHEELED
 
-from cbrrt_ompl.collision import clearance_map
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.motion.kinematics import (
     axis_limits,
@@ -36,17 +22,15 @@ from cbrrt_ompl.motion.kinematics import (
     unicycle_step,
 )
 from cbrrt_ompl.motion.manoeuvres import BRAKE, FORWARD, REVERSE, approach_command, has_ended, is_manoeuvre, most_steps
-from cbrrt_ompl.motion.model import OPEN_LOOP, pack_model
+from cbrrt_ompl.motion.model import OPEN_LOOP, make_model
 from cbrrt_ompl.planners.search import Search
-from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc
+from cbrrt_ompl.problem.obstacles import Bounds, Box
 from cbrrt_ompl.problem.robot import Footprint, Limits, Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 
 DT = 0.05
 EITHER = Limits(-0.6, 1.0, -2.0, 3.0, 0.9, 2.5, wheel_separation=0.4, wheel_speed=0.5, wheel_acceleration=0.7)
 """The wheels are what limits driving straight on and, to the left alone, turning on the spot."""
-
-LONG = Footprint.polygon([(-0.4, -0.1), (0.5, -0.1), (0.5, 0.1), (-0.4, 0.1)])
 
 
 class TestSineAndCosine:
@@ -60,7 +44,7 @@ class TestSineAndCosine:
         assert (round(s), round(c)) == ((0, 1, 0, -1)[quarters % 4], (1, 0, -1, 0)[quarters % 4])
 
 
-class TestPureLimits:
+class TestAxisLimits:
     def test_by_hand(self) -> None:
         found = axis_limits(EITHER)
         assert found == pytest.approx((-0.5, 0.5, -2.0, 2.5, 0.7, 2.5, 0.4, 0.5, 0.7), rel=1e-14)
@@ -135,140 +119,6 @@ class TestJointSteps:
         assert joint_ramp(0.0, 0.0, beyond, 0.0, EITHER, DT)[0] < beyond
 
 
-class TestDiscTree:
-    def test_a_rectangle_is_quartered_twice_into_the_smallest_discs(self) -> None:
-        growth = 1e-3
-        tree = disc_tree(Footprint.polygon([(-0.2, -0.1), (0.6, -0.1), (0.6, 0.3), (-0.2, 0.3)]), growth)
-        expected = []
-        for x, y in [(0.0, 0.0), (0.4, 0.0), (0.0, 0.2), (0.4, 0.2)]:
-            expected.append((x, y, math.hypot(0.2, 0.1) + growth, 0.1, len(expected) + 5))
-            for dx, dy in [(-0.1, -0.05), (0.1, -0.05), (-0.1, 0.05), (0.1, 0.05)]:
-                wall = min(x + dx + 0.2, 0.6 - x - dx, y + dy + 0.1, 0.3 - y - dy)
-                expected.append((x + dx, y + dy, math.hypot(0.1, 0.05) + growth, wall, len(expected) + 1))
-        assert tree == pytest.approx(np.array(expected), abs=1e-11)
-
-    def test_discs_that_are_not_grown_hold_their_corners_to_the_last_bit(self) -> None:
-        corners = np.array([(-0.2, -0.1), (0.6, -0.1), (0.6, 0.3), (-0.2, 0.3)])
-        tree = disc_tree(Footprint.polygon(corners), 0.0)
-        for corner in corners:
-            assert (np.hypot(*(tree[:, :2] - corner).T) < tree[:, 2]).sum() == 2  # its quarter, and the quarter of that
-
-
-class TestClearanceMap:
-    @pytest.fixture
-    def grown(self) -> ClearanceMap:
-        """A map that has split its cells about a thousand poses of a long robot."""
-        world = World(Bounds((-3.0, -1.5), (3.0, 1.5)), [Box((0.2, -1.0), (0.5, 1.0)), Disc((-1.0, 0.5), 0.3)])
-        grown = ClearanceMap(world, LONG)
-        for pose in np.random.default_rng(3).uniform((-2.9, -1.4, -3.0), (2.9, 1.4, 3.0), (1000, 3)).tolist():
-            grown.collides(*pose)
-        return grown
-
-    def test_the_leaf_of_a_position_holds_it_and_was_measured_in_its_centre(self, grown: ClearanceMap) -> None:
-        view, sides = grown.view, set()
-        assert len(view.children) == len(view.clearances) >= grown.cells
-        for x, y in np.random.default_rng(4).uniform((-3.0, -1.5), (3.0, 1.5), (2000, 2)).tolist():
-            leaf, x_centre, y_centre, side = find_leaf(view, x, y)
-            assert view.children[leaf] == 0
-            assert abs(x - x_centre) <= 0.5 * side and abs(y - y_centre) <= 0.5 * side
-            assert view.clearances[leaf, :2].tolist() == [x_centre, y_centre]
-            sides.add(side)
-        assert max(sides) / min(sides) >= 16.0
-
-    def test_a_new_map_was_measured_in_the_middle_of_a_square_on_its_lower_left_corner(self) -> None:
-        new = ClearanceMap(World(Bounds((-3.0, -1.5), (4.0, 1.5))), LONG)
-        root, *square = find_leaf(new.view, 1.0, 1.0)
-        assert new.cells == 1
-        assert square == [0.5, 2.0, 7.0]
-        assert new.clearances[root, :2].tolist() == [0.5, 2.0]
-
-    def test_deep_inside_an_obstacle_the_heading_makes_no_difference(self) -> None:
-        deep = ClearanceMap(World(Bounds((-3.0, -3.0), (3.0, 3.0)), [Box((-1.0, -1.0), (1.0, 1.0))]), LONG)
-        assert deep.collides(0.0, 0.0, 0.3)
-        assert certify(deep.view, 0.0, 0.0, 0.0) == COLLISION
-
-    def test_no_cell_is_split_for_a_disc_that_a_surface_cuts(self) -> None:
-        """Such a disc cannot be decided in cells of any size; the parts of the robot can, in large ones."""
-        beside = ClearanceMap(World(Bounds((-2.0, -2.0), (2.0, 2.0)), [Box((-2.0, 0.4), (2.0, 2.0))]), LONG)
-        beside.answer(0.1, 0.0, 0.0)
-        assert findings(beside) == []
-        assert certify(beside.view, 0.1, 0.0, ROOM) == UNDECIDED
-        assert 1 < beside.cells < 1 + 4 * math.log2(4.0 / SMALLEST_CELL)
-
-    def test_the_middle_of_a_cell_belongs_to_its_upper_right_part(self, grown: ClearanceMap) -> None:
-        assert find_leaf(grown.view, 0.0, 1.5)[1:3] > (0.0, 1.5)
-
-    def test_the_parts_of_a_long_robot_are_certified_where_the_whole_cannot_be(self) -> None:
-        """No disc about the whole robot fits into the corridor; those about its parts do, so FCL need not be asked."""
-        world = World(Bounds((-3.0, -1.0), (3.0, 1.0)), [Box((-3.0, y), (3.0, y + 0.7)) for y in (-0.95, 0.25)])
-        corridor = ClearanceMap(world, LONG)
-        for x, y, theta in np.random.default_rng(5).uniform((-2.4, -0.02, -0.02), (2.4, 0.02, 0.02), (200, 3)).tolist():
-            corridor.answer(x, y, theta)
-            assert findings(corridor) == []
-            assert certify(corridor.view, x, y, ROOM) == UNDECIDED
-            margin, is_of_the_origin = certify_pose(corridor.view, x, y, theta, ROOM)
-            assert margin > 0.0 and not is_of_the_origin
-        assert corridor.exact_queries == 0
-
-    def test_a_finest_part_is_certified_with_a_small_margin_too(self) -> None:
-        walls = [Box((-3.0, y), (3.0, y + 0.5)) for y in (-0.705, 0.205)]  # 1.5 cm beside the finest discs
-        corridor = ClearanceMap(World(Bounds((-3.0, -1.0), (3.0, 1.0)), walls), LONG)
-        corridor.answer(0.0, 0.0, 0.0)
-        assert findings(corridor) == []
-        assert 0.0 < certify_pose(corridor.view, 0.0, 0.0, 0.0, ROOM)[0] < GOOD_MARGIN
-        assert corridor.exact_queries == 0
-
-    def test_no_margin_reaches_further_than_the_origin_from_the_bounds(self) -> None:
-        """The footprint is further from them than its origin, which may not leave them either."""
-        footprint = Footprint.polygon([(0.1, -0.1), (0.3, -0.1), (0.3, 0.1), (0.1, 0.1)])
-        beside = ClearanceMap(World(Bounds((-1.0, -1.0), (1.0, 1.0))), footprint)
-        beside.answer(-0.95, 0.0, 0.0)
-        assert findings(beside) == []
-        margin, is_of_the_origin = certify_pose(beside.view, -0.95, 0.0, 0.0, ROOM)
-        assert 0.0 < margin <= 0.05 + 1e-12 and not is_of_the_origin
-
-    def test_a_part_inside_an_obstacle_is_certified_as_a_collision(self) -> None:
-        world = World(Bounds((-3.0, -1.0), (3.0, 1.0)), [Box((0.2, -0.5), (1.0, 0.5))])
-        beside = ClearanceMap(world, LONG)
-        beside.answer(0.0, 0.0, 0.0)
-        assert findings(beside) == []
-        assert certify(beside.view, 0.0, 0.0, ROOM) == UNDECIDED
-        assert certify_pose(beside.view, 0.0, 0.0, 0.0, ROOM) == (COLLISION, False)
-        assert beside.exact_queries == 0
-
-    def test_what_a_kernel_asked_is_kept_for_the_position_of_a_round_robot(self) -> None:
-        """The map is measured again at the position, so that the question is decided when it comes again."""
-        world = World(Bounds((-1.0, -1.0), (1.0, 1.0)), [Box((0.3, -1.0), (1.0, 1.0))])
-        kept = ClearanceMap(world, Footprint.disc(0.2))
-        x = 0.1 - 0.9 * ROOM
-        kept.answer(x, 0.0, 0.0)
-        assert findings(kept) == [[COLLISION, 0.0]]
-        assert certify(kept.view, x, 0.0, 0.0) == pytest.approx(0.9 * ROOM, abs=1e-5)
-        cells = kept.cells
-        kept.forget_findings()
-        kept.answer(x, 0.0, 1.0)
-        assert findings(kept) == []
-        assert kept.cells == cells
-
-    @pytest.mark.parametrize("share", [0.5, 1.5])
-    def test_a_position_is_certified_by_whether_it_has_room(self, share: float) -> None:
-        world = World(Bounds((-1.0, -1.0), (1.0, 1.0)), [Box((0.3, -1.0), (1.0, 1.0))])
-        near, x = ClearanceMap(world, Footprint.point()), 0.3 - share * ROOM
-        near.answer(x, 0.1, 0.0)
-        certificate = certify(near.view, x, 0.1, ROOM)
-        assert certificate == COLLISION if share < 1.0 else 0.0 < certificate <= 0.5 * ROOM
-
-    def test_the_answers_about_poses_stay_within_their_bound(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(clearance_map, "MAX_MARGINS", 3)
-        world = World(Bounds((-1.0, -1.0), (1.0, 1.0)))
-        bounded = ClearanceMap(world, LONG, enabled=False)
-        for i in range(8):
-            bounded.forget_findings()
-            bounded.answer(0.01 * i, 0.0, 0.0)
-            assert findings(bounded) == [[bounded.checker.margin(0.01 * i, 0.0, 0.0) - ROOM, 0.0]]
-        assert 1 <= len(bounded._margins) <= 3
-
-
 class TestManoeuvres:
     @pytest.mark.parametrize("manoeuvre", [FORWARD, REVERSE, BRAKE])
     def test_no_heading_is_taken_for_a_manoeuvre_nor_one_for_another(self, manoeuvre: float) -> None:
@@ -309,8 +159,8 @@ class TestBraking:
         """From full speed, 0.83 m from a wall, this robot could not."""
         world = World(Bounds((-2.0, -2.0), (2.0, 2.0)), [Box((0.8, -2.0), (1.0, 1.5))])
         planning = PlanningSettings(brake_safe=True, cut_extension=cut)
-        model = pack_model(OPEN_LOOP, Robot(), Goal(1.7, -1.7, tolerance=0.1), planning)
-        search = Search(model, ClearanceMap(world, Footprint.point()), [State(0.0, 0.0)], seed=1)
+        model = make_model(OPEN_LOOP, Robot(), Goal(1.7, -1.7, tolerance=0.1), planning)
+        search = Search(model, world, Footprint.point(), [State(0.0, 0.0)], seed=1)
         search.run(lambda _: False, 120)
         states = search.edges()[0]
         assert len(states) > 20

@@ -15,7 +15,7 @@ from cbrrt_ompl import load_scenario, make_setup, plan, verify
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.motion.kinematics import dynamic_step, saturate
 from cbrrt_ompl.motion.manoeuvres import BRAKE, FORWARD, REVERSE, has_ended, most_steps, next_velocity
-from cbrrt_ompl.motion.model import OPEN_LOOP, STEERING, pack_model
+from cbrrt_ompl.motion.model import OPEN_LOOP, STEERING, make_model
 from cbrrt_ompl.ompl_plugin.binding import ob
 from cbrrt_ompl.problem.obstacles import Bounds, Box
 from cbrrt_ompl.problem.robot import Footprint, Limits, Robot
@@ -46,7 +46,7 @@ robots = st.builds(
 
 def drive(start: State, manoeuvre: float, robot: Robot, goal: Goal, law: int = OPEN_LOOP) -> Trajectory:
     """The way of a manoeuvre, to its own end and not a step further; an error if it does not end in time."""
-    model = pack_model(law, robot, goal, PlanningSettings(step=DT))
+    model = make_model(law, robot, goal, PlanningSettings(step=DT))
     control = np.array([[0.0, 0.0, manoeuvre]])
     steps = most_steps(manoeuvre, math.hypot(goal.x - start.x, goal.y - start.y), robot.limits, DT)
     states = trajectory_from_controls(np.array(start), control, np.array([steps]), model).states
@@ -209,7 +209,7 @@ def stopping_states(state: np.ndarray, limits: Limits) -> list[tuple[float, ...]
 
 def cannot_brake(trajectory: Trajectory, scenario: Scenario) -> list[int]:
     """Rows from which braking to rest ends in an obstacle."""
-    collides = scenario.world.checker(scenario.robot.footprint).collides
+    collides = scenario.world.referee(scenario.robot.footprint).collides
     limits = scenario.robot.limits
     return [
         k
@@ -242,7 +242,7 @@ class TestBrakeSafe:
         scenario = load_scenario(scenarios / "paper_case2.yaml")
         safe = replace(scenario, planning=replace(scenario.planning, brake_safe=True, max_samples=2000))
         states = plan(safe, "cb-rrt-compiled", seed=1, time_limit=30.0).tree.states
-        collides = safe.world.checker(safe.robot.footprint).collides
+        collides = safe.world.referee(safe.robot.footprint).collides
         assert len(states) > 100
         for state in states:
             assert not any(collides(*there[:3]) for there in stopping_states(state, safe.robot.limits))

@@ -1,4 +1,4 @@
-"""What all kernels know of robot, goal and settings: what is packed is unpacked, and where the goal begins."""
+"""What all kernels know of robot, goal and settings, and where the goal begins."""
 
 from __future__ import annotations
 
@@ -8,45 +8,53 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from kernels import LAWS, coordinates, model_of, plain
+from kernels import LAWS, coordinates, model_of, plain, record_of
 
 from cbrrt_ompl.errors import SettingsError
 from cbrrt_ompl.motion.kinematics import unicycle_step
 from cbrrt_ompl.motion.model import (
     CLOSED_LOOP,
+    GOAL_REGION,
     OPEN_LOOP,
+    ROOM,
     STEERING,
-    GoalRegion,
     check_step,
     in_goal,
-    law_of,
-    pack_model,
-    unpack_model,
+    make_model,
+    motion_room,
 )
+from cbrrt_ompl.motion.records import record_array
+from cbrrt_ompl.planners.registry import law_of
 from cbrrt_ompl.problem.robot import Gains, Limits, Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 
 
 class TestModel:
     @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-    def test_it_survives_packing(self, law: int) -> None:
+    def test_it_holds_robot_goal_and_settings(self, law: int) -> None:
         limits = Limits(-0.1, 1.1, -0.2, 1.2, 0.3, 1.3, 0.4, 1.4, 0.5)
         robot = Robot(limits=limits, gains=Gains(1.0, 2.0, 3.0))
         goal = Goal(1.5, 2.5, 0.4, theta=0.7, heading_tolerance=0.2, speed_tolerance=0.1)
         planning = PlanningSettings(
             horizon=1.2, step=0.04, cut_extension="keep", equal_control_tolerance=0.07, look_ahead=1.7
         )
-        model = unpack_model(pack_model(law, robot, goal, planning))
+        model = record_of(make_model(law, robot, goal, planning))
         assert (model.law, model.dt, model.steps, model.look_ahead) == (law, 0.04, 30, 1.7)
         assert (model.equal_control_tolerance, model.keep_cut) == (0.07, True)
-        assert (model.limits, model.gains) == (limits, robot.gains)
-        assert model.goal == (1.5, 2.5, 0.4, 0.7, 0.2, 0.1)
+        assert (model.limits.tolist(), model.gains.tolist()) == (limits, robot.gains)
+        assert model.goal.tolist() == (1.5, 2.5, 0.4, 0.7, 0.2, 0.1)
 
     def test_what_the_goal_leaves_free_has_an_infinite_tolerance(self) -> None:
-        model = unpack_model(model_of(goal=Goal(1.0, 2.0)))
+        model = record_of(model_of(goal=Goal(1.0, 2.0)))
         assert (model.goal.heading_tolerance, model.goal.speed_tolerance) == (math.inf, math.inf)
         assert not model.keep_cut
         assert model.look_ahead == 2.0
+
+    @pytest.mark.parametrize("clearance", [0.0, 1e-4, ROOM, 0.05, 1.0])
+    def test_motions_keep_the_clearance_and_half_a_millimetre_at_least(self, clearance: float) -> None:
+        room = model_of(clearance=clearance)["room"][0]
+        assert room == motion_room(clearance)
+        assert max(clearance, ROOM) <= room <= max(clearance, ROOM) + 1e-5
 
     @pytest.mark.parametrize(
         ("planner", "closed_loop", "law"),
@@ -107,13 +115,15 @@ class TestGoalRegion:
             data.draw(speeds),
             data.draw(speeds),
         )
-        region = unpack_model(model_of(goal=goal)).goal
+        region = record_of(model_of(goal=goal)).goal
         assert in_goal(region, *state) == (not goal.violations(state))
         assert plain(in_goal)(region, *state) == in_goal(region, *state)
 
     @pytest.mark.parametrize("direction", [(1.0, 0.0), (0.0, -1.0)])
     def test_the_rim_of_the_disc_is_outside(self, direction: tuple[float, float]) -> None:
-        region = GoalRegion(0.0, 0.0, 0.5, 0.0, math.inf, math.inf)
+        regions = record_array(1, GOAL_REGION)
+        regions[0] = (0.0, 0.0, 0.5, 0.0, math.inf, math.inf)
+        region = record_of(regions)
         for radius, is_inside in ((0.5, False), (math.nextafter(0.5, 0.0), True)):
             assert in_goal(region, radius * direction[0], radius * direction[1], 3.0, 1.0, 1.0) is is_inside
 
@@ -122,6 +132,6 @@ class TestGoalRegion:
         for x, y in rng.uniform(-1.0, 1.0, (2000, 2)).tolist():
             for radius in (math.hypot(x, y), math.sqrt(x * x + y * y)):
                 goal = Goal(0.0, 0.0, radius)
-                assert in_goal(unpack_model(model_of(goal=goal)).goal, x, y, 0.0, 0.0, 0.0) == (
+                assert in_goal(record_of(model_of(goal=goal)).goal, x, y, 0.0, 0.0, 0.0) == (
                     not goal.violations(State(x, y))
                 )

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from kernels import plain
 from numpy.typing import NDArray
 
-from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.motion.control_laws import tracking_command
 from cbrrt_ompl.motion.kinematics import dynamic_step, kinematic_step
-from cbrrt_ompl.motion.model import CLOSED_LOOP, OPEN_LOOP, STEERING, pack_model
+from cbrrt_ompl.motion.model import CLOSED_LOOP, OPEN_LOOP, STEERING, make_model
+from cbrrt_ompl.motion.records import Records
 from cbrrt_ompl.planners.search import Search
 from cbrrt_ompl.problem.obstacles import Bounds, Disc
 from cbrrt_ompl.problem.robot import Footprint, Gains, Limits, Robot
@@ -30,8 +31,8 @@ controls_and_steps = st.lists(
 )
 
 
-def model_of(law: int, **planning: float) -> NDArray[np.float64]:
-    return pack_model(law, Robot(), Goal(90.0, 90.0), PlanningSettings(step=DT, **planning))
+def model_of(law: int, **planning: float) -> Records:
+    return make_model(law, Robot(), Goal(90.0, 90.0), PlanningSettings(step=DT, **planning))
 
 
 def arrays(parts: list[tuple[float, float, float, int]]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -61,7 +62,7 @@ def drive_by_hand(parts: list[tuple[float, float, float, int]], law: int) -> tup
 def search(request: pytest.FixtureRequest) -> Search:
     """A tree of a few hundred nodes."""
     world = World(Bounds((-5.0, -5.0), (5.0, 5.0)), [Disc((1.0, 1.0), 0.5)])
-    search = Search(model_of(request.param), ClearanceMap(world, Footprint.point()), [State(*START)], seed=2)
+    search = Search(model_of(request.param), world, Footprint.point(), [State(*START)], seed=2)
     search.run(lambda _: False, 800)
     assert search.nodes > 100
     return search
@@ -74,7 +75,7 @@ def test_a_path_is_driven_step_by_step(law: int, parts: list[tuple[float, float,
     by_hand = drive_by_hand(parts, law)
     assert np.array_equal(states, by_hand[0])
     assert np.array_equal(commands, by_hand[1])
-    python = getattr(replay_path, "py_func", replay_path)(START, *arrays(parts), model_of(law))
+    python = plain(replay_path)(START, *arrays(parts), model_of(law).view(np.recarray))
     assert states == pytest.approx(python[0], abs=1e-13)
     assert commands == pytest.approx(python[1], abs=1e-13)
 

@@ -6,12 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from kernels import LAWS, roll_out_answered
+from kernels import LAWS, roll_out_free
 
-from cbrrt_ompl.collision.clearance_map import ClearanceMap
-from cbrrt_ompl.collision.motion_check import BLOCKED, FREE
 from cbrrt_ompl.collision.world import World
-from cbrrt_ompl.motion.model import CLOSED_LOOP, pack_model
+from cbrrt_ompl.motion.model import CLOSED_LOOP, make_model
+from cbrrt_ompl.planners.roll_out import MOTION_BLOCKED, MOTION_FREE
 from cbrrt_ompl.planning import plan
 from cbrrt_ompl.problem.obstacles import Bounds, OrientedBox
 from cbrrt_ompl.problem.robot import Footprint, Limits, Robot
@@ -33,14 +32,14 @@ def wall_through(x: float, y: float, normal: float) -> OrientedBox:
 
 
 def driven_straight(law: int, footprint: Footprint, wall: OrientedBox | None, heading: float) -> tuple[int, float]:
-    """Drive 2 m from the origin at 1 m/s, all questions answered by FCL: what came of it and how far it went."""
-    model = pack_model(law, Robot(footprint), Goal(9.0, 9.0), PlanningSettings())
-    clearance_map = ClearanceMap(World(Bounds((-10.0, -10.0), (10.0, 10.0)), [wall] if wall else []), footprint)
+    """Drive 2 m from the origin at 1 m/s: the outcome, and how far it went."""
+    model = make_model(law, Robot(footprint), Goal(9.0, 9.0), PlanningSettings())
+    scene = World(Bounds((-10.0, -10.0), (10.0, 10.0)), [wall] if wall else []).scene(footprint)
     node = (0.0, 0.0, heading, SPEED, 0.0)
     control = (SPEED, 0.0, 0.0)
     if law == CLOSED_LOOP:
         control = (5.0 * math.cos(heading), 5.0 * math.sin(heading), heading)
-    _, outcome, state = roll_out_answered(clearance_map, node, control, model)
+    _, outcome, state = roll_out_free(scene, node, control, model)
     return outcome, math.hypot(*state[:2])
 
 
@@ -51,10 +50,10 @@ def test_no_extension_drives_through_it(law: int, footprint: Footprint) -> None:
     for heading, tilt, distance in zip(
         rng.uniform(-math.pi, math.pi, 100), rng.uniform(-1.3, 1.3, 100), rng.uniform(0.7, 1.9, 100), strict=True
     ):
-        assert driven_straight(law, footprint, None, heading) == (FREE, pytest.approx(2.0))
+        assert driven_straight(law, footprint, None, heading) == (MOTION_FREE, pytest.approx(2.0))
         wall = wall_through(distance * math.cos(heading), distance * math.sin(heading), heading + tilt)
         outcome, way = driven_straight(law, footprint, wall, heading)
-        assert outcome == BLOCKED and way < distance
+        assert outcome == MOTION_BLOCKED and way < distance
 
 
 @pytest.mark.parametrize("planner", ["cb-rrt", "s-rrt", "cb-rrt-compiled", "s-rrt-compiled", "cb-rrt-robust"])

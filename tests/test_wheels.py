@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from kernels import record_of
 from numpy.typing import NDArray
 from strategies import LIMITS, SHARES, WHEELED
 
@@ -17,8 +18,9 @@ from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import RobotError, ScenarioError
 from cbrrt_ompl.motion.control_laws import tracking_command
 from cbrrt_ompl.motion.kinematics import dynamic_step, has_wheel_limits, joint_ramp, ramp, saturate
-from cbrrt_ompl.motion.model import CLOSED_LOOP, OPEN_LOOP, STEERING, advance, pack_model, unpack_model
-from cbrrt_ompl.planners.roll_out import SCRATCH_SHAPE, integrate_block
+from cbrrt_ompl.motion.model import CLOSED_LOOP, OPEN_LOOP, STEERING, advance, make_model
+from cbrrt_ompl.motion.records import record_array
+from cbrrt_ompl.planners.roll_out import BLOCK, STEPS, integrate_block, state_at
 from cbrrt_ompl.problem.obstacles import Bounds, Box
 from cbrrt_ompl.problem.robot import Gains, Limits, Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
@@ -172,15 +174,14 @@ class TestJointRamp:
 def test_a_block_is_its_single_steps_bit_for_bit(
     law: int, limits: Limits, start: tuple[float, float], command: tuple[float, float], theta: float
 ) -> None:
-    model = unpack_model(pack_model(law, Robot(limits=limits), Goal(90.0, 90.0), PlanningSettings(step=DT)))
-    scratch = np.empty(SCRATCH_SHAPE)
-    velocity = inside(limits, *start)
-    integrate_block(theta, *velocity, *command, 48, model, scratch)
-    state = (0.0, 0.0, theta, *velocity)
-    for i in range(48):
-        x, y = state[0] + scratch[4, i], state[1] + scratch[5, i]
+    model = record_of(make_model(law, Robot(limits=limits), Goal(90.0, 90.0), PlanningSettings(step=DT)))
+    steps = record_of(record_array(1, STEPS))
+    state = (0.0, 0.0, theta, *inside(limits, *start))
+    steps.x[0], steps.y[0], steps.theta[0], steps.v[0], steps.omega[0] = state
+    integrate_block(steps, *command, BLOCK, model)
+    for i in range(BLOCK):
         *state, v_command, omega_command = advance(*state, (*command, 0.0), model, model.dt)
-        assert (x, y, scratch[2, i + 1], scratch[0, i + 1], scratch[1, i + 1]) == tuple(state)
+        assert state_at(steps, i + 1) == tuple(state)
         assert (v_command, omega_command) == saturate(*command, limits)
 
 
@@ -266,7 +267,7 @@ def test_every_node_of_a_brake_safe_tree_can_brake_as_slowly_as_its_wheels_do() 
     scenario = replace(scenario, goal=Goal(1.0, 5.0, tolerance=1e-9))
     states = plan(scenario, "cb-rrt-compiled", seed=1, time_limit=20.0).tree.states
     assert len(states) > 100
-    collides = scenario.world.checker(scenario.robot.footprint).collides
+    collides = scenario.world.referee(scenario.robot.footprint).collides
     for state in states.tolist():
         while state[3:] != [0.0, 0.0]:
             assert not collides(*state[:3])
@@ -281,8 +282,8 @@ def test_a_start_that_is_too_fast_for_a_wheel_is_refused() -> None:
 
 
 @pytest.mark.parametrize("law", [OPEN_LOOP, CLOSED_LOOP, STEERING])
-def test_a_packed_model_keeps_the_limits_of_the_wheels(law: int) -> None:
+def test_a_model_keeps_the_limits_of_the_wheels(law: int) -> None:
     limits = ROBOTS["jackal"].limits
-    model = unpack_model(pack_model(law, ROBOTS["jackal"], Goal(1.0, 2.0), PlanningSettings()))
-    assert model.limits == limits
+    model = record_of(make_model(law, ROBOTS["jackal"], Goal(1.0, 2.0), PlanningSettings()))
+    assert model.limits.tolist() == limits
     assert (model.goal.x, model.goal.y) == (1.0, 2.0)
