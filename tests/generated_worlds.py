@@ -78,10 +78,10 @@ def world_of(seed: int, world: int, max_samples: int) -> Scenario:
 
 def _beside_obstacle(rng: Generator, scenario: Scenario) -> State:
     """A scenario's start, moved in a random direction until less than a millimetre is left."""
-    start, checker = scenario.start, scenario.world.checker(scenario.robot.footprint)
+    start, world, footprint = scenario.start, scenario.world, scenario.robot.footprint
     angle, aim = rng.uniform(-math.pi, math.pi), 10.0 ** rng.uniform(-6.0, -3.0)
     for _ in range(1000):
-        step = checker.clearance(start.x, start.y, start.theta) - 0.5 * aim
+        step = world.clearance(footprint, start[:3]) - 0.5 * aim
         if step < 0.5 * aim:
             break
         start = start._replace(x=start.x + step * math.cos(angle), y=start.y + step * math.sin(angle))

@@ -16,7 +16,6 @@ from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -35,12 +34,11 @@ from cbrrt_ompl.benchmark.experiment import Experiment
 from cbrrt_ompl.benchmark.local import run_locally
 from cbrrt_ompl.benchmark.log import Log, PlannerLog, format_log, merge_logs, parse_log, read_log
 from cbrrt_ompl.cli import main
-from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from cbrrt_ompl.errors import CbrrtError, InputError, SettingsError, UnknownPlannerError
 from cbrrt_ompl.motion.model import OPEN_LOOP, STEERING
 from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
 from cbrrt_ompl.ompl_plugin.samplers import ExtensionSampler
-from cbrrt_ompl.planning import PLANNERS
+from cbrrt_ompl.planners.registry import PLANNERS
 
 OPEN = """
 name: Open field
@@ -348,18 +346,6 @@ def test_time_ends_a_run(field: Scenario) -> None:
     assert run["solved"] == "0"
     assert 0.3 <= float(run["planning time"]) < 0.4
     assert float(run["planning time"]) <= float(run["time"])
-
-
-def test_the_time_ends_a_run_within_an_extension(scenarios: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    office = load_scenario(scenarios / "office.yaml")
-    office = replace(office, planning=replace(office.planning, brake_safe=True))
-    without = ClearanceMap(office.world, office.robot.footprint, enabled=False)
-    monkeypatch.setattr("cbrrt_ompl.benchmark.experiment.clearance_map_for", lambda *_: without)
-    clock = SimpleNamespace(perf_counter=iter(range(1000)).__next__)
-    monkeypatch.setattr("cbrrt_ompl.benchmark.entrant.time", clock)
-    ((run,),) = cells(Experiment(office, {"cb-rrt": [1]}).run(6.0)).values()
-    assert run["samples"] == "1"
-    assert run["graph states"] == "1"
 
 
 def test_settings_are_those_of_the_planners_themselves(field: Scenario) -> None:

@@ -18,6 +18,7 @@ from cbrrt_ompl.cli import build_parser, main, program
 from cbrrt_ompl.cli.output_files import SUFFIXES
 from cbrrt_ompl.errors import InputError, Problem
 from cbrrt_ompl.figures import figures
+from cbrrt_ompl.planners.registry import PLANNERS
 from cbrrt_ompl.reproduce import demo
 from cbrrt_ompl.scenario.scenario import load_scenario
 from cbrrt_ompl.trajectory.trajectory import Trajectory
@@ -286,7 +287,7 @@ def test_show_draws_the_trajectory(
 def test_planners_lists_every_planner(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["planners"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines] == list(planning.PLANNERS)
+    assert [line.split()[0] for line in lines] == list(PLANNERS)
     assert all(len(line.split()) > 2 for line in lines)
 
 
@@ -365,7 +366,7 @@ def test_colors_are_for_terminals_without_no_color(
 
 def test_planners_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["planners", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == planning.PLANNERS
+    assert json.loads(capsys.readouterr().out) == {name: row.description for name, row in PLANNERS.items()}
 
 
 def test_verification_as_json(

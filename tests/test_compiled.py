@@ -14,11 +14,11 @@ import pytest
 from numpy.typing import NDArray
 
 from cbrrt_ompl import load_scenario, make_setup, plan, verify
-from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from cbrrt_ompl.collision.world import World
-from cbrrt_ompl.motion.model import law_of, pack_model
+from cbrrt_ompl.motion.model import make_model
 from cbrrt_ompl.ompl_plugin.binding import ob, oc, ot, ou
 from cbrrt_ompl.ompl_plugin.compiled_planner import CompiledPlanner
+from cbrrt_ompl.planners.registry import law_of
 from cbrrt_ompl.planners.search import Search
 from cbrrt_ompl.problem.obstacles import Bounds, Box
 from cbrrt_ompl.problem.robot import Limits, Robot
@@ -44,18 +44,19 @@ OPEN = Scenario(
 """An empty world whose goal nobody hits."""
 
 
-def clearance_map(scenario: Scenario, *, enabled: bool = True) -> ClearanceMap:
-    """A map that knows nothing yet."""
-    return ClearanceMap(scenario.world, scenario.robot.footprint, enabled=enabled)
-
-
-def grow(scenario: Scenario, planner: str, seed: int, samples: int, known: ClearanceMap) -> Search:
-    """A search after some samples, or in the goal."""
-    model = pack_model(law_of(planner, scenario.planning), scenario.robot, scenario.goal, scenario.planning)
-    search = Search(
-        model, known, [scenario.start], seed,
-        goal_bias=scenario.planning.goal_bias, neighbours=scenario.planning.nearest_neighbour,
+def make_search(scenario: Scenario, planner: str = "cb-rrt-compiled", seed: int = 1) -> Search:
+    """A search before its first sample."""
+    planning = scenario.planning
+    model = make_model(law_of(planner, planning), scenario.robot, scenario.goal, planning)
+    return Search(
+        model, scenario.world, scenario.robot.footprint, [scenario.start], seed,
+        goal_bias=planning.goal_bias, neighbours=planning.nearest_neighbour,
     )  # fmt: skip
+
+
+def grow(scenario: Scenario, planner: str, seed: int, samples: int) -> Search:
+    """A search after some samples, or in the goal."""
+    search = make_search(scenario, planner, seed)
     search.run(lambda _: False, samples)
     return search
 
@@ -82,37 +83,25 @@ def assert_equal(tree: Tree, other: Tree) -> None:
         ("slalom", "s-rrt-compiled", False),
     ],
 )
-def test_the_tree_is_the_same_whatever_the_map_holds(
+def test_the_tree_is_the_same_whatever_was_planned_before(
     scenarios: Path, scene: str, planner: str, closed_loop: bool
 ) -> None:
-    """With a map that is empty, grown by other searches, or not there at all, so that FCL decides every state."""
-    scenario = load_scenario(scenarios / f"{scene}.yaml")
-    scenario = replace(scenario, planning=replace(scenario.planning, closed_loop=closed_loop))
-    grown = clearance_map(scenario)
+    """In the same world, whose scene is kept, as in one that was loaded anew."""
+    scenario, anew = (load_scenario(scenarios / f"{scene}.yaml") for _ in range(2))
+    planning = replace(scenario.planning, closed_loop=closed_loop)
+    scenario, anew = replace(scenario, planning=planning), replace(anew, planning=planning)
+    tree = grow(scenario, planner, 7, 150).tree()
     for seed in range(5):
-        grow(scenario, planner, seed, 2000, grown)
-    tree = grow(scenario, planner, 7, 150, clearance_map(scenario)).tree()
-    assert_equal(tree, grow(scenario, planner, 7, 150, grown).tree())
-    assert_equal(tree, grow(scenario, planner, 7, 150, clearance_map(scenario, enabled=False)).tree())
-
-
-@pytest.mark.parametrize("cut", ["discard", "keep"])
-def test_the_tree_is_the_same_whatever_the_map_holds_where_cut_extensions_are_kept(scenarios: Path, cut: str) -> None:
-    scenario = load_scenario(scenarios / "office.yaml")
-    scenario = replace(scenario, planning=replace(scenario.planning, cut_extension=cut))
-    trees = [
-        grow(scenario, "cb-rrt-compiled", 3, 300, clearance_map(scenario, enabled=enabled)).tree()
-        for enabled in (True, False)
-    ]
-    assert len(trees[0]) > 20
-    assert_equal(*trees)
+        grow(scenario, planner, seed, 500)
+    assert_equal(tree, grow(scenario, planner, 7, 150).tree())
+    assert_equal(tree, grow(anew, planner, 7, 150).tree())
 
 
 @pytest.mark.parametrize("planner", COMPILED_PLANNERS)
 def test_the_tree_is_the_same_however_often_the_search_pauses(scenarios: Path, planner: str) -> None:
     scenario = load_scenario(scenarios / "paper_case1.yaml")
-    whole = grow(scenario, planner, 3, 1500, clearance_map(scenario))
-    interrupted = grow(scenario, planner, 3, 1, clearance_map(scenario))
+    whole = grow(scenario, planner, 3, 1500)
+    interrupted = grow(scenario, planner, 3, 1)
     for samples in range(8, 1501, 7):
         interrupted.run(lambda _: False, samples)
     interrupted.run(lambda _: False, 1500)
@@ -120,34 +109,12 @@ def test_the_tree_is_the_same_however_often_the_search_pauses(scenarios: Path, p
     assert_equal(whole.tree(), interrupted.tree())
 
 
-def test_a_search_stops_within_an_extension_and_goes_on_as_if_it_had_not(
-    scenarios: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A brake-safe extension of a robot with corners can take half a second."""
-    scenario = load_scenario(scenarios / "office.yaml")
-    scenario = replace(scenario, planning=replace(scenario.planning, brake_safe=True))
-    whole = grow(scenario, "cb-rrt-compiled", 3, 12, clearance_map(scenario, enabled=False))
-    monkeypatch.setattr("cbrrt_ompl.planners.search.PAUSE", 0.0)
-    model = pack_model(law_of("cb-rrt-compiled", scenario.planning), scenario.robot, scenario.goal, scenario.planning)
-    search = Search(model, clearance_map(scenario, enabled=False), [scenario.start], 3)
-    asked = []
-
-    def should_stop(samples: int) -> bool:
-        asked.append(samples)
-        return len(asked) >= 4
-
-    search.run(should_stop, 12)
-    assert asked == [0, 0, 0, 0, 0]  # before the first extension, within it, and before it again
-    search.run(lambda _: False, 12)
-    assert_equal(whole.tree(), search.tree())
-
-
 def trees_by_neighbours(scenario: Scenario, samples: int) -> list[Tree]:
     """The trees that each way to find the nearest node leads to."""
     trees = []
     for name in NEAREST_NEIGHBOUR:
         varied = replace(scenario, planning=replace(scenario.planning, nearest_neighbour=name))
-        trees.append(grow(varied, "cb-rrt-compiled", 1, samples, clearance_map(varied)).tree())
+        trees.append(grow(varied, "cb-rrt-compiled", 1, samples).tree())
     return trees
 
 
@@ -272,7 +239,7 @@ def ompl() -> Iterator[None]:
 def compiled_setup(scenario: Scenario, planner: str = "cb-rrt-compiled", seed: int = 1) -> tuple[Any, CompiledPlanner]:
     """A SimpleSetup that plans with a compiled planner."""
     setup = make_setup(scenario, planner)
-    compiled = CompiledPlanner(setup.getSpaceInformation(), scenario, planner, clearance_map(scenario), seed)
+    compiled = CompiledPlanner(setup.getSpaceInformation(), scenario, planner, seed)
     setup.setPlanner(compiled)
     return setup, compiled
 
@@ -429,10 +396,12 @@ def test_the_sample_limit_ends_a_solve() -> None:
     assert time.perf_counter() - began < 5.0
 
 
-def test_a_search_asks_every_few_milliseconds_whether_to_stop() -> None:
-    """With FCL deciding every state, the slowest that it can be."""
-    model = pack_model(law_of("cb-rrt-compiled", OPEN.planning), OPEN.robot, OPEN.goal, OPEN.planning)
-    search = Search(model, clearance_map(OPEN, enabled=False), [OPEN.start], 1)
+@pytest.mark.parametrize("brake_safe", [False, True], ids=["", "brake safe"])
+def test_a_search_asks_every_few_milliseconds_whether_to_stop(scenarios: Path, brake_safe: bool) -> None:
+    """Among the obstacles of an office, where a robot with corners has the slowest extensions."""
+    office = load_scenario(scenarios / "office.yaml")
+    planning = replace(office.planning, brake_safe=brake_safe)
+    search = make_search(replace(office, goal=replace(office.goal, tolerance=1e-12), planning=planning))
     search.run(lambda _: False, 20)
     began, asked = time.perf_counter(), []
 
@@ -448,8 +417,7 @@ def test_a_search_asks_every_few_milliseconds_whether_to_stop() -> None:
 @pytest.mark.slow
 def test_a_large_tree_is_left_as_fast_as_a_small_one() -> None:
     """Within 10 ms on a machine that does nothing else; the bound leaves room for one that does."""
-    model = pack_model(law_of("cb-rrt-compiled", OPEN.planning), OPEN.robot, OPEN.goal, OPEN.planning)
-    search = Search(model, clearance_map(OPEN), [OPEN.start], 1, neighbours="kd-tree")
+    search = make_search(replace(OPEN, planning=replace(OPEN.planning, nearest_neighbour="kd-tree")))
     asked: list[float] = []
 
     def should_stop(samples: int) -> bool:
@@ -460,8 +428,9 @@ def test_a_large_tree_is_left_as_fast_as_a_small_one() -> None:
     assert np.diff(asked).max() < 0.5
 
 
-def test_a_node_takes_at_most_a_hundred_bytes() -> None:
-    search = grow(OPEN, "cb-rrt-compiled", 1, 3000, clearance_map(OPEN))
-    capacity = len(search._tree.states)
-    arrays = [array for array in search._tree if len(array) == capacity]
-    assert sum(array.nbytes for array in arrays) <= 100 * capacity
+def test_a_node_takes_at_most_two_hundred_bytes() -> None:
+    search = grow(OPEN, "cb-rrt-compiled", 1, 3000)
+    index = search._index
+    arrays = [search._tree, index.places, index.heads, index.words]
+    assert len(search._tree) == len(index.places) > 256
+    assert sum(array.nbytes for array in arrays) <= 200 * len(search._tree)

@@ -12,7 +12,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cbrrt_ompl.collision.clearance_map import ClearanceMap, clearance_map_for, extend_map
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.drive import Drive, DriveResult, DriveSettings, drive
 from cbrrt_ompl.drive.knowledge import Knowledge
@@ -54,7 +53,7 @@ def assert_sound(result: DriveResult) -> None:
     assert result.verification.violations == ()
     np.testing.assert_array_equal(result.braking.states[: len(result.trajectory)], result.trajectory.states)
     np.testing.assert_array_equal(result.braking.states[-1, 3:], 0.0)
-    collides = result.world.checker(result.scenario.robot.footprint).collides
+    collides = result.world.referee(result.scenario.robot.footprint).collides
     fine = np.linspace(result.braking.t[0], result.braking.t[-1], 20 * len(result.braking))
     assert not any(collides(*pose) for pose in result.braking.at(fine)[:, :3].tolist())
 
@@ -232,7 +231,7 @@ def test_progress_is_told_after_every_cycle() -> None:
 
 def test_an_obstacle_is_seen_when_its_nearest_point_comes_into_range() -> None:
     disc, box = Disc((5.0, 2.0), 1.0), OrientedBox((1.0, 3.5), (0.4, 0.4), 0.3)
-    knowledge = Knowledge(World(HALL, [BOX_AHEAD]), [disc, box], Footprint.point())
+    knowledge = Knowledge(World(HALL, [BOX_AHEAD]), [disc, box])
     assert knowledge.look(1.999, 2.0, 2.0) == [box]
     assert knowledge.look(1.9999, 2.0, 2.0) == []
     assert knowledge.look(2.0, 2.0, 2.0) == [disc]
@@ -246,25 +245,10 @@ obstacles = st.one_of(
     st.builds(lambda x, y, d: Box((x, y), (x + d, y + 0.5)), coordinate, coordinate, coordinate),
     st.builds(lambda x, y, d: Polygon(np.array([(x, y), (x + d, y), (x, y + d)])), coordinate, coordinate, coordinate),
 )
-poses = st.tuples(st.floats(-0.1, 8.1), st.floats(-0.1, 4.1), st.floats(-3.0, 3.0))
-
-
-@given(st.lists(obstacles, max_size=3), st.lists(obstacles, min_size=1, max_size=3), st.lists(poses, min_size=5))
-def test_a_map_that_learns_obstacles_answers_as_one_made_anew(
-    known: list[Obstacle], added: list[Obstacle], asked: list[tuple[float, float, float]]
-) -> None:
-    before, after = World(HALL, known), World(HALL, [*known, *added])
-    learned = clearance_map_for(before, OBLONG.footprint)
-    for pose in asked:
-        learned.collides(*pose)
-    learned = extend_map(before, after, OBLONG.footprint)
-    anew = ClearanceMap(after, OBLONG.footprint)
-    for pose in asked:
-        assert learned.collides(*pose) == anew.collides(*pose) == after.collides(OBLONG.footprint, pose)
 
 
 @given(obstacles, st.lists(st.tuples(st.floats(0.1, 7.9), st.floats(0.1, 3.9)), min_size=1, max_size=10))
-def test_signed_distances_are_those_of_fcl(obstacle: Obstacle, points: list[tuple[float, float]]) -> None:
+def test_signed_distances_are_those_of_the_world(obstacle: Obstacle, points: list[tuple[float, float]]) -> None:
     far = World(Bounds((-100.0, -100.0), (100.0, 100.0)), [obstacle])
     x, y = np.array(points).T
     found = signed_distance(obstacle, x, y)

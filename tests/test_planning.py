@@ -20,7 +20,8 @@ import pytest
 from cbrrt_ompl import plan, verify
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import SettingsError, UnknownPlannerError
-from cbrrt_ompl.planning import PLANNERS, PlanResult
+from cbrrt_ompl.planners.registry import PLANNERS
+from cbrrt_ompl.planning import PlanResult
 from cbrrt_ompl.problem.obstacles import Bounds, Box
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.scenario.scenario import Scenario

@@ -223,10 +223,10 @@ def test_whole_cells_pass_a_gap_of_their_size_only_if_they_lie_in_it(gap: Scenar
 def test_a_path_on_a_grid_is_free_and_as_long_as_its_steps(gap: Scenario) -> None:
     path = shortest_path(replace(gap, start=State(0.5, 0.1, 0.0)), 0.1, origin=(0.03, 0.07))
     assert path is not None
-    checker = gap.world.checker(gap.robot.footprint)
+    referee = gap.world.referee(gap.robot.footprint)
     for a, b in zip(path.points[:-1], path.points[1:], strict=True):
         along = np.linspace(a, b, 500)
-        assert not any(checker.collides(x, y, 0.0) for x, y in along.tolist())
+        assert not any(referee.collides(x, y, 0.0) for x, y in along.tolist())
     steps = np.abs(np.diff(path.points, axis=0))
     octile = (np.maximum(*steps.T) + (math.sqrt(2.0) - 1.0) * np.minimum(*steps.T)).sum()
     assert path.length == pytest.approx(octile)

@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 from cbrrt_ompl import PlanResult, Scenario, load_scenario, plan, verify
-from cbrrt_ompl.collision.clearance_map import clearance_map_for
 from cbrrt_ompl.problem.robot import Footprint
 from cbrrt_ompl.scenario.scenario import scenario_from_dict
 
@@ -28,7 +27,7 @@ JOBS = [
 
 @pytest.fixture(scope="module")
 def scenario() -> Scenario:
-    """A wall with a gap, and a robot with corners, so that FCL is asked about single poses."""
+    """A wall with a gap, and a robot with corners, so that no disc decides all poses."""
     return scenario_from_dict(
         {
             "name": "gap",
@@ -71,7 +70,7 @@ def assert_same(found: PlanResult, alone: PlanResult) -> None:
 def test_plans_of_many_threads_are_those_of_one(scenario: Scenario, hasty_threads: None) -> None:
     alone = [plan_without_clock(scenario, *job) for job in JOBS]
     assert sum(result.solved for result in alone) > len(JOBS) / 2
-    fresh = copy.deepcopy(scenario)  # a world of which no map holds anything yet
+    fresh = copy.deepcopy(scenario)  # a world of which no scene is made yet
     with ThreadPoolExecutor(4) as pool:
         futures: list[Future[PlanResult]] = [
             pool.submit(plan_without_clock, fresh, *job) for job in [*JOBS, *reversed(JOBS)]
@@ -108,24 +107,25 @@ def test_queries_and_verification_in_one_thread_leave_plans_of_another_alone(
 def test_queries_of_two_threads_do_not_meet(scenario: Scenario, hasty_threads: None) -> None:
     """FCL's object of the footprint used to be moved by one thread while another one asked about it."""
     footprint, places = scenario.robot.footprint, [(-3.0, -3.0, 0.3), (0.0, -1.0, 1.0), (2.0, 2.0, 0.0)]
-    alone = [scenario.world.clearance(footprint, place) for place in places]
+    alone = [(scenario.world.clearance(footprint, p), scenario.world.referee(footprint).collides(*p)) for p in places]
+    assert {collides for _, collides in alone} == {False, True}
 
-    def ask(place: tuple[float, float, float]) -> set[float]:
-        return {scenario.world.clearance(footprint, place) for _ in range(2000)}
+    def ask(place: tuple[float, float, float]) -> set[tuple[float, bool]]:
+        world, referee = scenario.world, scenario.world.referee(footprint)
+        return {(world.clearance(footprint, place), referee.collides(*place)) for _ in range(2000)}
 
     with ThreadPoolExecutor(3) as pool:
-        assert list(pool.map(ask, places)) == [{clearance} for clearance in alone]
+        assert list(pool.map(ask, places)) == [{answers} for answers in alone]
 
 
-def test_each_thread_has_a_map_of_its_own(scenario: Scenario) -> None:
-    footprint = Footprint.disc(0.1)
-    mine = clearance_map_for(scenario.world, footprint)
-    with ThreadPoolExecutor(1) as pool:
-        theirs = pool.submit(clearance_map_for, scenario.world, footprint).result()
-        assert theirs is not mine
-        assert theirs.checker is not mine.checker
-        assert pool.submit(clearance_map_for, scenario.world, footprint).result() is theirs
-    assert clearance_map_for(scenario.world, footprint) is mine
+def test_threads_share_the_scene_and_have_a_referee_each(scenario: Scenario) -> None:
+    footprint, world = Footprint.disc(0.1), copy.deepcopy(scenario.world)
+    with ThreadPoolExecutor(4) as pool:
+        scenes = list(pool.map(lambda _: world.scene(footprint), range(8)))
+        theirs = pool.submit(world.referee, footprint).result()
+    assert all(scene is scenes[0] for scene in [*scenes, world.scene(footprint)])
+    assert world.referee(footprint) is world.referee(footprint)
+    assert theirs is not world.referee(footprint)
 
 
 def test_plans_of_many_processes_are_those_of_one(scenario: Scenario) -> None:
