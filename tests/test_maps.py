@@ -20,10 +20,10 @@ from hypothesis.extra.numpy import array_shapes, arrays
 from numpy.typing import NDArray
 from PIL import Image
 
-from cbrrt_ompl.collision.world import Bounds, Box, Disc, Polygon, World
+from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import InputError, MapError
 from cbrrt_ompl.maps import OccupancyMap, load_discs, load_dynobench, load_map, rasterize, save_map
-from cbrrt_ompl.problem.obstacles import Obstacle, OrientedBox
+from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, Obstacle, OrientedBox, Polygon
 from cbrrt_ompl.problem.robot import Footprint, Limits
 from cbrrt_ompl.scenario.scenario import load_scenario
 
