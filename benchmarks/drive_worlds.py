@@ -68,8 +68,8 @@ def touches(result: DriveResult) -> bool:
     steps, begins = np.diff(trajectory.t), trajectory.t[:-1]
     parts = np.ceil(steps * (np.maximum(v, v_end) + reach * np.maximum(omega, omega_end)) / SPACING).astype(int) + 1
     times = np.concatenate([t + dt * np.arange(n) / n for t, dt, n in zip(begins, steps, parts, strict=True)])
-    checker = result.world.checker(robot.footprint)
-    return any(checker.collides(*pose) for pose in trajectory.at(np.append(times, trajectory.t[-1]))[:, :3].tolist())
+    referee = result.world.referee(robot.footprint)
+    return any(referee.collides(*pose) for pose in trajectory.at(np.append(times, trajectory.t[-1]))[:, :3].tolist())
 
 
 def main() -> None:

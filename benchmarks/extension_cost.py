@@ -1,4 +1,4 @@
-"""What an extension attempt costs: plugin and compiled loop, with and without the clearance map, by tree size.
+"""What an extension attempt costs: plugin and compiled loop, by tree size.
 
 The goal is out of reach, so that trees grow as large as asked. Measured are the attempts in which a tree grows from
 half its size to its size (from its root for 300 nodes), the best of five trees.
@@ -17,11 +17,10 @@ from pathlib import Path
 import numpy as np
 
 from cbrrt_ompl import Bounds, Disc, Goal, Scenario, State, World, load_scenario
-from cbrrt_ompl.collision.clearance_map import ClearanceMap
-from cbrrt_ompl.motion.model import law_of, pack_model
+from cbrrt_ompl.motion.model import make_model
 from cbrrt_ompl.ompl_plugin.run import run
+from cbrrt_ompl.planners.registry import is_compiled, law_of
 from cbrrt_ompl.planners.search import Search
-from cbrrt_ompl.planning import clearance_map_for
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 OUT_OF_REACH = Goal(0.0, 0.0, tolerance=1e-12)
@@ -46,7 +45,7 @@ def worlds() -> dict[str, Scenario]:
     return {name: replace(s, planning=replace(s.planning, max_samples=10**9)) for name, s in made.items()}
 
 
-def cost_in_plugin(scenario: Scenario, planner: str, size: int, clearance_map: ClearanceMap, seed: int) -> float:
+def cost_in_plugin(scenario: Scenario, planner: str, size: int, seed: int) -> float:
     """Seconds per attempt in control::RRT; the sampler's time and everything that OMPL does around it."""
     began: list[tuple[float, int]] = []
     ended: list[tuple[float, int]] = []
@@ -63,20 +62,20 @@ def cost_in_plugin(scenario: Scenario, planner: str, size: int, clearance_map: C
     equipment: list = []
     sampler_of = lambda: equipment[0].sampler if equipment else None  # noqa: E731
     started = time.perf_counter()
-    run(scenario, planner, seed, lambda: None, should_stop, clearance_map, equipment.append)
+    run(scenario, planner, seed, lambda: None, should_stop, equipment.append)
     if not ended:
         return float("nan")
     return (ended[0][0] - began[0][0]) / (ended[0][1] - began[0][1])
 
 
-def cost_in_loop(scenario: Scenario, planner: str, size: int, clearance_map: ClearanceMap, seed: int) -> float:
+def cost_in_loop(scenario: Scenario, planner: str, size: int, seed: int) -> float:
     """Seconds per attempt in the compiled loop."""
-    model = pack_model(law_of(planner, scenario.planning), scenario.robot, scenario.goal, scenario.planning)
+    model = make_model(law_of(planner, scenario.planning), scenario.robot, scenario.goal, scenario.planning)
     elapsed, attempts = 0.0, 0
     started = time.perf_counter()
     for repetition in range(max(1, 3000 // size)):
         search = Search(
-            model, clearance_map, [scenario.start], 1000 * seed + repetition,
+            model, scenario.world, scenario.robot.footprint, [scenario.start], 1000 * seed + repetition,
             neighbours=scenario.planning.nearest_neighbour,
         )  # fmt: skip
         portion = max(50, size // 50)
@@ -98,33 +97,22 @@ def main() -> None:
     parser.add_argument("--sizes", type=int, nargs="+", default=[300, 3000, 30000])
     parser.add_argument("--planners", nargs="+", default=["cb-rrt", "s-rrt", "cb-rrt-compiled", "s-rrt-compiled"])
     parser.add_argument("--worlds", nargs="+", default=list(worlds()))
-    parser.add_argument("--fcl", action="store_true", help="add the plugin with FCL at every state (slow)")
     arguments = parser.parse_args()
     print(f"{'microseconds per attempt':<42}" + "".join(f"{size:>11,}" for size in arguments.sizes))
     for name, scenario in worlds().items():
         if name not in arguments.worlds:
             continue
         for planner in arguments.planners:
-            is_compiled = planner.endswith("-compiled")
-            for enabled in (True,) if is_compiled or not arguments.fcl else (False, True):
-                footprint = scenario.robot.footprint
-                clearance_map = (
-                    clearance_map_for(scenario.world, footprint)
-                    if enabled
-                    else ClearanceMap(scenario.world, footprint, enabled=False)
-                )
-                how = "" if is_compiled else ", map" if enabled else ", FCL at every state"
-                measure = cost_in_loop if is_compiled else cost_in_plugin
-                print(f"{name + ': ' + planner + how:<42}", end="", flush=True)
-                for size in arguments.sizes:
-                    repetitions = REPETITIONS if size < 10**6 else 1
-                    costs = [measure(scenario, planner, size, clearance_map, 0)]
-                    if not np.isnan(costs[0]):
-                        costs += [measure(scenario, planner, size, clearance_map, s) for s in range(1, repetitions)]
-                    print(
-                        f"{1e6 * np.nanmin(costs) if not np.isnan(costs).all() else np.nan:>11.2f}", end="", flush=True
-                    )
-                print(flush=True)
+            measure = cost_in_loop if is_compiled(planner) else cost_in_plugin
+            print(f"{name + ': ' + planner:<42}", end="", flush=True)
+            for size in arguments.sizes:
+                repetitions = REPETITIONS if size < 10**6 else 1
+                costs = [measure(scenario, planner, size, 0)]
+                if not np.isnan(costs[0]):
+                    costs += [measure(scenario, planner, size, seed) for seed in range(1, repetitions)]
+                cost = 1e6 * np.nanmin(costs) if not np.isnan(costs).all() else np.nan
+                print(f"{cost:>11.2f}", end="", flush=True)
+            print(flush=True)
 
 
 if __name__ == "__main__":

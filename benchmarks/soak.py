@@ -15,10 +15,10 @@ import time
 from pathlib import Path
 
 from cbrrt_ompl import Bounds, Box, Goal, PlanningSettings, Scenario, State, World, plan
-from cbrrt_ompl.planning import PLANNERS
+from cbrrt_ompl.planners.registry import PLANNERS
 
 WARM_UP = 20
-"""Plans before memory is to be flat: caches fill, the clearance map grows, the allocator finds its level."""
+"""Plans before memory is to be flat: caches fill, the allocator finds its level."""
 
 LEAKS_IN_OMPL = {"sst"}  # OMPL 1.7.0 frees not all that SST prunes, without any part of ours too
 
