@@ -401,7 +401,8 @@ def test_completion_knows_commands_planners_and_files(tmp_path: Path, capsys: py
                          ("cbrrt plan mi", {"mine.yaml"})):  # fmt: skip
         words = line.split()
         code = f"""source {script}; COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}
-                   _shtab_cbrrt cbrrt {words[-1]} {words[-2]}; printf '%s\\n' "${{COMPREPLY[@]}}" """
+                   [[ $(complete -p cbrrt) =~ -F\\ ([^\\ ]+) ]] && ${{BASH_REMATCH[1]}} cbrrt {words[-1]} {words[-2]}
+                   printf '%s\\n' "${{COMPREPLY[@]}}" """
         done = subprocess.run(
             ["bash", "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=True
         )
