@@ -9,10 +9,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from cbrrt_ompl.collision.clearance_map import ClearanceMap, clearance_map_for, extend_map
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cbrrt_ompl.collision.clearance_map import ClearanceMap, clearance_map_for, extend_map
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.drive import Drive, DriveResult, DriveSettings, drive
 from cbrrt_ompl.drive.knowledge import Knowledge
@@ -183,6 +183,7 @@ def test_settings_that_make_no_sense_are_refused(field: str, value: object) -> N
         DriveSettings(**{field: value})
 
 
+@pytest.mark.needs_ompl
 def test_planning_in_ompl_drives_as_well() -> None:
     result = drive(hall(), [BOX_AHEAD], replace(REPEATABLE, planner="cb-rrt"), seed=1)
     assert result.status == "reached"

@@ -153,6 +153,7 @@ def test_a_kill_while_writing_leaves_a_whole_file(tmp_path: Path) -> None:
         assert len(set(content)) == 1
 
 
+@pytest.mark.needs_ompl
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, -signal.SIGTERM)])
 def test_signals_end_a_plan_and_leave_the_old_files(tmp_path: Path, number: int, code: int) -> None:
     closed = World(WORLD.bounds, [Box((0.9, 0.0), (1.1, 2.0))])

@@ -50,6 +50,7 @@ def run_python(code: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
 
 
+@pytest.mark.needs_ompl
 @pytest.mark.parametrize(
     ("ending", "exit_code"),
     [("pass", 0), ("sys.exit(0)", 0), ("sys.exit(3)", 3), ("raise RuntimeError('on purpose')", 1)],
@@ -62,6 +63,7 @@ def test_a_process_that_imported_ompl_ends_with_its_own_exit_code(ending: str, e
     assert ("on purpose" in done.stderr) == (exit_code == 1)
 
 
+@pytest.mark.needs_ompl
 def test_a_process_that_planned_ends_with_its_own_exit_code(scenarios: Path) -> None:
     code = f"""import sys, cbrrt_ompl
 result = cbrrt_ompl.plan(cbrrt_ompl.load_scenario({str(scenarios / "paper_case1.yaml")!r}), time_limit=0.05)

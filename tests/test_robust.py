@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cbrrt_ompl.collision.clearance_map import ClearanceMap
 
 from cbrrt_ompl import (
     Bounds,
@@ -23,13 +24,15 @@ from cbrrt_ompl import (
     plan,
     verify,
 )
-from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from cbrrt_ompl.motion.model import law_of, pack_model
-from cbrrt_ompl.ompl_plugin.compiled_planner import CompiledPlanner
+from cbrrt_ompl.ompl_plugin.availability import has_ompl
 from cbrrt_ompl.planners.growth import bearable_failures
 from cbrrt_ompl.planners.nearest import BRUTE_FORCE, GRID, KD_TREE, Index, insert, nearest
 from cbrrt_ompl.planners.search import Search
 from cbrrt_ompl.problem.settings import NEAREST_NEIGHBOUR
+
+if has_ompl():
+    from cbrrt_ompl.ompl_plugin.compiled_planner import CompiledPlanner
 
 ROBUST = "cb-rrt-robust"
 
@@ -166,6 +169,7 @@ def test_half_the_samples_of_the_plain_planner_do_in_the_maze(scenarios: Path) -
     assert 2.0 * medians[ROBUST] < medians["cb-rrt-compiled"]
 
 
+@pytest.mark.needs_ompl
 def test_the_planner_of_ompl_grows_the_same_tree(blind_alley: Scenario) -> None:
     settings = replace(blind_alley.planning, max_samples=500)
     scenario = replace(blind_alley, goal=Goal(4.0, 0.0, tolerance=1e-9), planning=settings)

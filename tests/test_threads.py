@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cbrrt_ompl.collision.clearance_map import clearance_map_for
 
 from cbrrt_ompl import PlanResult, Scenario, load_scenario, plan, verify
-from cbrrt_ompl.collision.clearance_map import clearance_map_for
 from cbrrt_ompl.problem.robot import Footprint
 from cbrrt_ompl.scenario.scenario import scenario_from_dict
 
@@ -68,6 +68,7 @@ def assert_same(found: PlanResult, alone: PlanResult) -> None:
     assert np.array_equal(found.tree.states, alone.tree.states)
 
 
+@pytest.mark.needs_ompl
 def test_plans_of_many_threads_are_those_of_one(scenario: Scenario, hasty_threads: None) -> None:
     alone = [plan_without_clock(scenario, *job) for job in JOBS]
     assert sum(result.solved for result in alone) > len(JOBS) / 2
@@ -128,6 +129,7 @@ def test_each_thread_has_a_map_of_its_own(scenario: Scenario) -> None:
     assert clearance_map_for(scenario.world, footprint) is mine
 
 
+@pytest.mark.needs_ompl
 def test_plans_of_many_processes_are_those_of_one(scenario: Scenario) -> None:
     jobs = [("cb-rrt-compiled", 1), ("cb-rrt", 2), ("cb-rrt-robust", 1)]
     alone = [plan_without_clock(scenario, *job) for job in jobs]
@@ -137,6 +139,7 @@ def test_plans_of_many_processes_are_those_of_one(scenario: Scenario) -> None:
             assert_same(future.result(timeout=120.0), expected)
 
 
+@pytest.mark.needs_ompl
 def test_a_plan_within_the_progress_of_another_does_not_wait_for_it(scenario: Scenario) -> None:
     inner: list[PlanResult] = []
 
