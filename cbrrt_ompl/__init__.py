@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from cbrrt_ompl.collision.world import World
-    from cbrrt_ompl.errors import CbrrtError, InputError
+    from cbrrt_ompl.errors import CbrrtError, InputError, OmplMissingError
     from cbrrt_ompl.maps import OccupancyMap, load_dynobench, load_map, save_map
     from cbrrt_ompl.ompl_plugin.setup import make_setup
     from cbrrt_ompl.planning import PlanResult, plan
@@ -35,6 +35,7 @@ __all__ = [
     "InputError",
     "Limits",
     "OccupancyMap",
+    "OmplMissingError",
     "OrientedBox",
     "PlanResult",
     "PlanningSettings",
@@ -58,7 +59,7 @@ __all__ = [
 
 _MODULES = {
     "collision.world": ("World",),
-    "errors": ("CbrrtError", "InputError"),
+    "errors": ("CbrrtError", "InputError", "OmplMissingError"),
     "ompl_plugin.setup": ("make_setup",),
     "planning": ("PlanResult", "plan"),
     "problem.obstacles": ("Bounds", "Box", "Disc", "OrientedBox", "Polygon"),
@@ -79,11 +80,23 @@ def __getattr__(name: str) -> Any:
     if name == "__version__":
         value = _installed_version()
     elif name in _HOME:
-        value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+        value = _public_value(name)
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value
     return value
+
+
+def _public_value(name: str) -> object:
+    """A public name's value; where it needs OMPL and there is none, what says so when it is used."""
+    from cbrrt_ompl.errors import OmplMissingError
+
+    try:
+        return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    except OmplMissingError:
+        from cbrrt_ompl.ompl_plugin.availability import Absent
+
+        return Absent(name)
 
 
 def _installed_version() -> str:

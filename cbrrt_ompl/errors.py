@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 
 class CbrrtError(Exception):
@@ -102,6 +104,25 @@ class UnknownPlannerError(InputError):
         """Report the unknown name together with the known ones."""
         self.name, self.known = name, sorted(known)
         super().__init__(Problem("planner", name, f"one of {', '.join(self.known)}"))
+
+
+class OmplMissingError(CbrrtError, ImportError):
+    """Something that needs OMPL, where OMPL is not installed.
+
+    Attributes:
+        what: what needs it.
+        instead: what does not need it; empty where nothing does the same.
+    """
+
+    def __init__(self, what: str, instead: str = "") -> None:
+        """Report what needs OMPL, where OMPL is to be had, and what to use without it."""
+        self.what, self.instead = what, instead
+        where = f"which has wheels for Python 3.10 to 3.12 (this is {'.'.join(map(str, sys.version_info[:3]))})"
+        super().__init__(f"{what} needs OMPL 1.7.0, {where}" + (f"; without it: {instead}" if instead else ""))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Go through a pickle as what it was made of."""
+        return type(self), (self.what, self.instead)
 
 
 def _short(value: object, limit: int = 60) -> str:

@@ -29,6 +29,11 @@ def as_path(path: object, error: type[InputError]) -> Path:
     raise error(Problem("path", path, "the name of a file"))
 
 
+def reason_of(error: Exception) -> str:
+    """Why a file was not opened: the system's words, or ours for a name that Python refuses before it asks."""
+    return getattr(error, "strerror", None) or "no name of a file"
+
+
 def write_file(path: Path, content: bytes | str, error: type[InputError] = InputError) -> None:
     """Write one file; see :func:`write_files`."""
     write_files({path: content}, error)
@@ -59,8 +64,7 @@ def write_files(contents: Mapping[Path, bytes | str], error: type[InputError] = 
         for draft, target in drafts:
             os.replace(draft, target)
     except (OSError, ValueError) as cause:  # ValueError: a NUL in the name
-        reason = getattr(cause, "strerror", None) or str(cause)
-        raise error(Problem("", Remark(reason), "a file that can be written"), str(path)) from cause
+        raise error(Problem("", Remark(reason_of(cause)), "a file that can be written"), str(path)) from cause
     finally:
         for draft, _ in drafts:
             with suppress(OSError):  # gone into its place, or never made

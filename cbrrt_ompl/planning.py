@@ -15,6 +15,7 @@ import numpy as np
 from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.errors import Problem, SettingsError
 from cbrrt_ompl.motion.model import check_step, make_model
+from cbrrt_ompl.ompl_plugin.availability import check_ompl, has_ompl
 from cbrrt_ompl.planners.registry import PLANNERS, is_compiled, law_of, planner_named
 from cbrrt_ompl.planners.search import Search
 from cbrrt_ompl.planners.warm_up import warm_up
@@ -91,6 +92,7 @@ def plan(
     Raises:
         ScenarioError: if this is no scenario.
         UnknownPlannerError: if there is no such planner.
+        OmplMissingError: if the planner needs OMPL, and there is none; the planners of this package's own do not.
         SettingsError: if the seed, the time limit or the step make no sense.
         KeyboardInterrupt: on Ctrl-C, at once.
     """
@@ -107,8 +109,20 @@ def plan(
     return _plan_in_ompl(scenario, planner, seed, watch)
 
 
+def available_planners() -> list[str]:
+    """Names of the planners that can plan here: all of them, or without OMPL the compiled ones."""
+    return [name for name in PLANNERS if has_ompl() or is_compiled(name)]
+
+
 def warm_up_planner(planner: str) -> None:
-    """Load or compile all kernels that a planner needs, before a clock runs."""
+    """Load or compile all kernels that a planner needs, before a clock runs.
+
+    Raises:
+        UnknownPlannerError: if there is no such planner.
+        OmplMissingError: if it needs OMPL, and there is none.
+    """
+    if not is_compiled(planner):
+        check_ompl(f"planner {planner!r}", "s-rrt-compiled" if planner == "s-rrt" else "cb-rrt-compiled")
     warm_up()
     if not is_compiled(planner):
         from cbrrt_ompl.ompl_plugin import warm_up as plugin  # here, so that the compiled planners need no OMPL

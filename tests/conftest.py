@@ -27,6 +27,20 @@ def scenarios(repository: Path) -> Path:
 @pytest.fixture(scope="session", autouse=True)
 def _compiled_kernels() -> None:
     """Compile once, so that no test waits for it or meets the message about it."""
+    from cbrrt_ompl.ompl_plugin.availability import has_ompl
     from cbrrt_ompl.planning import warm_up_planner
 
-    warm_up_planner("cb-rrt")
+    warm_up_planner("cb-rrt" if has_ompl() else "cb-rrt-compiled")
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Where there is no OMPL, skip what is marked so and what is given a planner that OMPL runs, and say why."""
+    from cbrrt_ompl.errors import OmplMissingError
+    from cbrrt_ompl.ompl_plugin.availability import has_ompl
+    from cbrrt_ompl.planners.registry import PLANNERS
+    from cbrrt_ompl.planning import available_planners
+
+    given = item.callspec.params.get("planner") if hasattr(item, "callspec") else None
+    unavailable = isinstance(given, str) and given in set(PLANNERS) - set(available_planners())
+    if unavailable or (item.get_closest_marker("needs_ompl") and not has_ompl()):
+        pytest.skip(str(OmplMissingError("this test")))

@@ -32,9 +32,11 @@ from cbrrt_ompl import (
 )
 from cbrrt_ompl.collision.world import Obstacle
 from cbrrt_ompl.figures.figures import draw_plan
+from cbrrt_ompl.planners.registry import is_compiled
+from cbrrt_ompl.planning import available_planners
 from cbrrt_ompl.trajectory.replay import MAX_EDGE_POINTS
 
-PLANNERS = ("cb-rrt-compiled", "s-rrt-compiled", "cb-rrt-robust", "cb-rrt", "rrt", "pdst")
+PLANNERS = [name for name in available_planners() if is_compiled(name) or name in ("cb-rrt", "rrt", "pdst")]
 
 
 def scene(size: float = 10.0, corner: float = 0.0, obstacles: list[Obstacle] | None = None, **parts: Any) -> Scenario:

@@ -61,7 +61,8 @@ def walled_file(tmp_path: Path) -> Path:
 @pytest.fixture
 def saved(open_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
     path = tmp_path / "saved.csv"
-    assert main(["plan", str(open_file), "--seed", "1", "--trajectory", str(path)]) == 0
+    arguments = ["--planner", "cb-rrt-compiled", "--seed", "1", "--trajectory", str(path)]
+    assert main(["plan", str(open_file), *arguments]) == 0
     capsys.readouterr()
     return path
 
@@ -84,6 +85,7 @@ def argument_error(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     return line
 
 
+@pytest.mark.needs_ompl
 def test_a_solved_plan_exits_0_and_prints_aligned_figures(open_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", str(open_file), "--seed", "1"]) == 0
     captured = capsys.readouterr()
@@ -97,6 +99,7 @@ def test_a_solved_plan_exits_0_and_prints_aligned_figures(open_file: Path, capsy
     assert captured.err == ""
 
 
+@pytest.mark.needs_ompl
 def test_an_unsolved_plan_exits_1_and_writes_no_trajectory(
     walled_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -110,6 +113,7 @@ def test_an_unsolved_plan_exits_1_and_writes_no_trajectory(
     assert figure.exists()
 
 
+@pytest.mark.needs_ompl
 def test_the_written_trajectory_is_the_planned_one_and_valid(
     open_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -126,6 +130,7 @@ def test_the_written_trajectory_is_the_planned_one_and_valid(
     assert printed["figure"] is None
 
 
+@pytest.mark.needs_ompl
 def test_json_of_an_unsolved_plan_has_no_trajectory(walled_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", str(walled_file), "--json"]) == 1
     printed = json.loads(capsys.readouterr().out)
@@ -134,6 +139,7 @@ def test_json_of_an_unsolved_plan_has_no_trajectory(walled_file: Path, capsys: p
     assert printed["trajectory"] is printed["duration"] is printed["length"] is printed["point_turns"] is None
 
 
+@pytest.mark.needs_ompl
 def test_files_of_an_unsolved_plan_are_said_not_to_be_written(
     walled_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -258,6 +264,7 @@ def test_a_trajectory_through_a_wall_exits_1(
     assert "collision" in capsys.readouterr().out
 
 
+@pytest.mark.needs_ompl
 def test_jumping_velocities_need_the_kinematic_option(open_file: Path, tmp_path: Path) -> None:
     path = tmp_path / "jumps.csv"
     assert main(["plan", str(open_file), "--planner", "s-rrt", "--seed", "1", "--trajectory", str(path)]) == 0
@@ -344,6 +351,7 @@ def test_help_fits_80_columns(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Ca
     assert max(map(len, capsys.readouterr().out.splitlines())) <= 80
 
 
+@pytest.mark.needs_ompl
 @pytest.mark.parametrize(
     ("terminal", "no_color", "colored"), [(True, "", True), (True, "1", False), (False, "", False)]
 )
@@ -366,7 +374,10 @@ def test_colors_are_for_terminals_without_no_color(
 
 def test_planners_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["planners", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == {name: row.description for name, row in PLANNERS.items()}
+    found = json.loads(capsys.readouterr().out)
+    assert {name: text.partition(" [not available")[0] for name, text in found.items()} == {
+        name: planner.description for name, planner in PLANNERS.items()
+    }
 
 
 def test_verification_as_json(
@@ -402,7 +413,8 @@ def test_completion_knows_commands_planners_and_files(tmp_path: Path, capsys: py
                          ("cbrrt plan mi", {"mine.yaml"})):  # fmt: skip
         words = line.split()
         code = f"""source {script}; COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}
-                   _shtab_cbrrt cbrrt {words[-1]} {words[-2]}; printf '%s\\n' "${{COMPREPLY[@]}}" """
+                   [[ $(complete -p cbrrt) =~ -F\\ ([^\\ ]+) ]] && ${{BASH_REMATCH[1]}} cbrrt {words[-1]} {words[-2]}
+                   printf '%s\\n' "${{COMPREPLY[@]}}" """
         done = subprocess.run(
             ["bash", "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=True
         )
@@ -424,6 +436,7 @@ def test_version_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out == f"cbrrt {__version__}\n"
 
 
+@pytest.mark.needs_ompl
 @pytest.mark.parametrize(("terminal", "reports"), [(True, True), (False, False)])
 def test_progress_is_reported_on_a_terminal_only(
     open_file: Path, monkeypatch: pytest.MonkeyPatch, terminal: bool, reports: bool
@@ -472,6 +485,7 @@ def test_compilation_is_told_of_on_a_terminal_only(
     assert ("compiling the planners" in capsys.readouterr().err) == terminal
 
 
+@pytest.mark.needs_ompl
 def test_an_interrupt_is_one_line_and_exit_code_130(
     open_file: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -493,6 +507,7 @@ def test_a_reader_that_leaves_is_no_error(repository: Path) -> None:
     assert (process.returncode, err) == (141, b"")
 
 
+@pytest.mark.needs_ompl
 def test_errors_on_files_are_one_line(
     open_file: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -504,6 +519,7 @@ def test_errors_on_files_are_one_line(
     assert error_lines(capsys) == ["path.csv: No space left on device"]
 
 
+@pytest.mark.needs_ompl
 def test_the_demo_writes_figures_trajectories_and_table(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -525,6 +541,7 @@ def test_the_demo_writes_figures_trajectories_and_table(
     assert (output / "results.md").read_text(encoding="utf-8").count("| paper_case") == 6
 
 
+@pytest.mark.needs_ompl
 def test_the_demo_expects_s_rrt_to_fail_in_case_2(scenarios: Path) -> None:
     scenario = load_scenario(scenarios / "paper_case2.yaml")
     unsolved = planning.plan(scenario, "s-rrt", seed=1, time_limit=0.1)
@@ -534,6 +551,7 @@ def test_the_demo_expects_s_rrt_to_fail_in_case_2(scenarios: Path) -> None:
     assert run.cells()[2] == "not solved (as in the paper)"
 
 
+@pytest.mark.needs_ompl
 def test_control_c_ends_a_running_plan(tmp_path: Path) -> None:
     path = tmp_path / "endless.yaml"
     path.write_text(WALLED.replace("max_samples: 50", "max_samples: 100000000"), encoding="utf-8")

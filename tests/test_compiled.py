@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from cbrrt_ompl import load_scenario, make_setup, plan, verify
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.motion.model import make_model
-from cbrrt_ompl.ompl_plugin.binding import ob, oc, ot, ou
-from cbrrt_ompl.ompl_plugin.compiled_planner import CompiledPlanner
+from cbrrt_ompl.ompl_plugin.availability import has_ompl
 from cbrrt_ompl.planners.registry import law_of
 from cbrrt_ompl.planners.search import Search
 from cbrrt_ompl.problem.obstacles import Bounds, Box
@@ -25,6 +24,10 @@ from cbrrt_ompl.problem.robot import Limits, Robot
 from cbrrt_ompl.problem.settings import NEAREST_NEIGHBOUR, Goal, PlanningSettings, State
 from cbrrt_ompl.scenario.scenario import Scenario
 from cbrrt_ompl.trajectory.tree import Tree
+
+if has_ompl():
+    from cbrrt_ompl.ompl_plugin.binding import ob, oc, ot, ou
+    from cbrrt_ompl.ompl_plugin.compiled_planner import CompiledPlanner
 
 COMPILED_PLANNERS = ["cb-rrt-compiled", "s-rrt-compiled"]
 BOUNDS = Bounds((0.0, 0.0), (10.0, 10.0))
@@ -244,6 +247,7 @@ def compiled_setup(scenario: Scenario, planner: str = "cb-rrt-compiled", seed: i
     return setup, compiled
 
 
+@pytest.mark.needs_ompl
 @pytest.mark.usefixtures("ompl")
 @pytest.mark.parametrize("closed_loop", [False, True], ids=["open loop", "closed loop"])
 @pytest.mark.parametrize("planner", COMPILED_PLANNERS)
@@ -261,12 +265,13 @@ def test_simple_setup_solves_with_a_compiled_planner(planner: str, closed_loop: 
     assert [end[0][0], end[0][1]] == pytest.approx([trajectory.x[-1], trajectory.y[-1]], abs=1e-9)
 
 
+@pytest.mark.needs_ompl
 @pytest.mark.usefixtures("ompl")
-@pytest.mark.parametrize("make_data", [oc.PlannerData, ob.PlannerData])
-def test_planner_data_holds_the_tree(make_data: Callable[[Any], Any]) -> None:
+@pytest.mark.parametrize("has_controls", [True, False])
+def test_planner_data_holds_the_tree(has_controls: bool) -> None:
     setup, compiled = compiled_setup(EASY)
     assert setup.solve(5.0)
-    data = make_data(setup.getSpaceInformation())
+    data = (oc if has_controls else ob).PlannerData(setup.getSpaceInformation())
     setup.getPlannerData(data)
     assert compiled.search is not None
     nodes = compiled.search.nodes
@@ -282,9 +287,10 @@ def test_planner_data_holds_the_tree(make_data: Callable[[Any], Any]) -> None:
             edge = data.getEdge(int(parents[node]), node)
             assert edge.getDuration() == pytest.approx(steps[node] * EASY.planning.step)
             assert [edge.getControl()[i] for i in range(2)] == controls[node, :2].tolist()
-    assert data.hasControls() == (make_data is oc.PlannerData)
+    assert data.hasControls() == has_controls
 
 
+@pytest.mark.needs_ompl
 @pytest.mark.usefixtures("ompl")
 def test_planner_data_is_empty_before_the_first_solve() -> None:
     setup, compiled = compiled_setup(EASY)
@@ -293,6 +299,7 @@ def test_planner_data_is_empty_before_the_first_solve() -> None:
     assert data.numVertices() == 0
 
 
+@pytest.mark.needs_ompl
 @pytest.mark.usefixtures("ompl")
 def test_clear_forgets_the_tree_and_the_next_one_is_another() -> None:
     setup, compiled = compiled_setup(EASY)
@@ -307,6 +314,7 @@ def test_clear_forgets_the_tree_and_the_next_one_is_another() -> None:
     assert compiled.search.tree().states.tobytes() != first.states.tobytes()
 
 
+@pytest.mark.needs_ompl
 @pytest.mark.usefixtures("ompl")
 def test_the_tree_is_kept_from_one_solve_to_the_next() -> None:
     setup, compiled = compiled_setup(OPEN)
@@ -318,6 +326,7 @@ def test_the_tree_is_kept_from_one_solve_to_the_next() -> None:
     assert not setup.haveSolutionPath()
 
 
+@pytest.mark.needs_ompl
 @pytest.mark.usefixtures("ompl")
 def test_the_start_of_the_problem_definition_is_the_root() -> None:
     setup, compiled = compiled_setup(EASY)
@@ -330,6 +339,7 @@ def test_the_start_of_the_problem_definition_is_the_root() -> None:
     assert compiled.search.trajectory().states[0].tolist() == [3.0, 7.0, 1.0, 0.0, 0.0]
 
 
+@pytest.mark.needs_ompl
 @pytest.mark.usefixtures("ompl")
 def test_benchmark_runs_a_compiled_planner_beside_one_of_ompl(tmp_path: Path) -> None:
     setup, compiled = compiled_setup(EASY)
@@ -362,6 +372,7 @@ def test_benchmark_runs_a_compiled_planner_beside_one_of_ompl(tmp_path: Path) ->
 # limits
 
 
+@pytest.mark.needs_ompl
 @pytest.mark.usefixtures("ompl")
 @pytest.mark.parametrize("planner", COMPILED_PLANNERS)
 def test_a_termination_condition_is_honoured_at_once(planner: str) -> None:
@@ -377,6 +388,7 @@ def test_a_termination_condition_is_honoured_at_once(planner: str) -> None:
     assert 0.0 <= delay < 0.05
 
 
+@pytest.mark.needs_ompl
 @pytest.mark.usefixtures("ompl")
 def test_a_condition_that_holds_already_ends_a_solve_before_the_first_sample() -> None:
     setup, compiled = compiled_setup(OPEN)
@@ -385,6 +397,7 @@ def test_a_condition_that_holds_already_ends_a_solve_before_the_first_sample() -
     assert compiled.search.samples == 0
 
 
+@pytest.mark.needs_ompl
 @pytest.mark.usefixtures("ompl")
 def test_the_sample_limit_ends_a_solve() -> None:
     scenario = replace(OPEN, planning=replace(OPEN.planning, max_samples=500))

@@ -141,7 +141,14 @@ def test_the_scenario_on_the_scenario_page_can_be_loaded(docs: Path, tmp_path: P
     assert len(load_scenario(path).world.obstacles) == 4
 
 
-@pytest.mark.parametrize("page", ["getting-started.md", "own-map.md", "faq.md"])
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param("getting-started.md", marks=pytest.mark.needs_ompl),
+        "own-map.md",
+        pytest.param("faq.md", marks=pytest.mark.needs_ompl),
+    ],
+)
 def test_the_python_on_the_pages_runs(repository: Path, docs: Path, tmp_path: Path, page: str) -> None:
     code = "\n".join(blocks((docs / page).read_text(encoding="utf-8"), "python"))
     environment = {**os.environ, "PYTHONPATH": str(repository)}

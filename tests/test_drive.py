@@ -182,6 +182,7 @@ def test_settings_that_make_no_sense_are_refused(field: str, value: object) -> N
         DriveSettings(**{field: value})
 
 
+@pytest.mark.needs_ompl
 def test_planning_in_ompl_drives_as_well() -> None:
     result = drive(hall(), [BOX_AHEAD], replace(REPEATABLE, planner="cb-rrt"), seed=1)
     assert result.status == "reached"

@@ -65,7 +65,7 @@ def test_a_full_disk_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(os, "fsync", fill_the_disk)
     with pytest.raises(InputError) as caught:
         WRITERS[name](path)
-    assert str(caught.value).endswith(": got No space left on device, expected a file that can be written")
+    assert str(caught.value).endswith(f": got {os.strerror(errno.ENOSPC)}, expected a file that can be written")
     assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == {**before, name: b"old"}
 
 
@@ -73,7 +73,7 @@ def test_files_that_belong_together_are_all_new_or_all_old(tmp_path: Path) -> No
     image, folder = tmp_path / "map.pgm", tmp_path / "map.yaml"
     image.write_bytes(b"old")
     folder.mkdir()
-    with pytest.raises(InputError, match="map.yaml: got Is a directory, expected a file that can be written"):
+    with pytest.raises(InputError, match=f"map.yaml: got {os.strerror(errno.EISDIR)}, expected a file"):
         write_files({image: b"new", folder: "text"})
     assert image.read_bytes() == b"old"
     assert sorted(file.name for file in tmp_path.iterdir()) == ["map.pgm", "map.yaml"]
@@ -82,10 +82,10 @@ def test_files_that_belong_together_are_all_new_or_all_old(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
-        ("none/a.md", "No such file or directory"),
-        ("file/a.md", "Not a directory"),
-        ("a" * 300, "File name too long"),
-        ("a\0b", "embedded null byte"),
+        ("none/a.md", os.strerror(errno.ENOENT)),
+        ("file/a.md", os.strerror(errno.ENOTDIR)),
+        ("a" * 300, os.strerror(errno.ENAMETOOLONG)),
+        ("a\0b", "no name of a file"),
     ],
 )
 def test_a_place_where_nothing_can_be_is_one_line(tmp_path: Path, name: str, reason: str) -> None:
@@ -100,7 +100,7 @@ def test_a_device_takes_what_is_written_and_stays_a_device(tmp_path: Path) -> No
     full, null = tmp_path / "full.csv", tmp_path / "null.csv"
     full.symlink_to("/dev/full")
     null.symlink_to("/dev/null")
-    with pytest.raises(InputError, match="got No space left on device"):
+    with pytest.raises(InputError, match=f"got {os.strerror(errno.ENOSPC)}"):
         TRAJECTORY.save(full)
     TRAJECTORY.save(null)
     assert all(stat.S_ISCHR(path.stat().st_mode) for path in (full, null))
@@ -123,7 +123,7 @@ def test_a_read_only_file_is_left_alone(tmp_path: Path) -> None:
     path = tmp_path / "a.md"
     path.write_text("old")
     path.chmod(0o444)
-    with pytest.raises(InputError, match="Permission denied"):
+    with pytest.raises(InputError, match=os.strerror(errno.EACCES)):
         write_file(path, "new")
     assert path.read_text() == "old"
 
@@ -153,6 +153,7 @@ def test_a_kill_while_writing_leaves_a_whole_file(tmp_path: Path) -> None:
         assert len(set(content)) == 1
 
 
+@pytest.mark.needs_ompl
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, -signal.SIGTERM)])
 def test_signals_end_a_plan_and_leave_the_old_files(tmp_path: Path, number: int, code: int) -> None:
     closed = World(WORLD.bounds, [Box((0.9, 0.0), (1.1, 2.0))])
@@ -190,8 +191,7 @@ def test_a_wrong_backend_of_matplotlib_is_one_line(tmp_path: Path) -> None:
     save_scenario(SCENARIO, tmp_path / "s.yaml")
     done = run(["show", str(tmp_path / "s.yaml"), "--figure", str(tmp_path / "a.png")], MPLBACKEND="nonsense")
     assert done.returncode == 2
-    assert done.stderr.startswith("cbrrt: error: MPLBACKEND: ")
-    assert len(done.stderr.splitlines()) == 1
+    assert done.stderr == "cbrrt: error: MPLBACKEND: got 'nonsense', expected a backend of matplotlib\n"
 
 
 def test_a_name_that_the_terminal_has_no_letters_for_is_printed(tmp_path: Path) -> None:

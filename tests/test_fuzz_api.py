@@ -39,6 +39,7 @@ from cbrrt_ompl import (
     save_scenario,
     verify,
 )
+from cbrrt_ompl.ompl_plugin.availability import has_ompl
 from cbrrt_ompl.problem.settings import MAX_SAMPLES
 from cbrrt_ompl.scenario.dynobench import load_dynobench
 from cbrrt_ompl.scenario.maps.discs import load_discs
@@ -88,7 +89,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         plan,
         {"scenario": SCENARIO, "planner": "cb-rrt-compiled", "seed": 1, "time_limit": 1.0, "progress": None},
     ),
-    "make_setup": (make_setup, {"scenario": SCENARIO, "planner": "cb-rrt"}),
+    **({"make_setup": (make_setup, {"scenario": SCENARIO, "planner": "cb-rrt"})} if has_ompl() else {}),
     "verify": (verify, {"trajectory": TRAJECTORY, "scenario": SCENARIO, "tolerance": 1e-3}),
     "load_scenario": (load_scenario, {"path": "none.yaml"}),
     "save_scenario": (save_scenario, {"scenario": SCENARIO, "path": "/none/file.yaml"}),
@@ -167,7 +168,8 @@ def test_a_wrong_setting_is_named_with_what_it_should_be(name: str, value: objec
 
 @given(ANYTHING)
 def test_what_is_no_scenario_is_refused_by_everything_that_takes_one(value: Any) -> None:
-    for call in (plan, make_setup, lambda s: verify(TRAJECTORY, s), lambda s: save_scenario(s, Path("x.yaml"))):
+    calls = [plan, lambda s: verify(TRAJECTORY, s), lambda s: save_scenario(s, Path("x.yaml"))]
+    for call in [*calls, make_setup] if has_ompl() else calls:
         with pytest.raises(InputError, match="expected a value of type Scenario"):
             call(value)
 

@@ -16,13 +16,16 @@ from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.motion.kinematics import dynamic_step, saturate
 from cbrrt_ompl.motion.manoeuvres import BRAKE, FORWARD, REVERSE, has_ended, most_steps, next_velocity
 from cbrrt_ompl.motion.model import OPEN_LOOP, STEERING, make_model
-from cbrrt_ompl.ompl_plugin.binding import ob
+from cbrrt_ompl.ompl_plugin.availability import has_ompl
 from cbrrt_ompl.problem.obstacles import Bounds, Box
 from cbrrt_ompl.problem.robot import Footprint, Limits, Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.scenario.scenario import Scenario
 from cbrrt_ompl.trajectory.replay import trajectory_from_controls
 from cbrrt_ompl.trajectory.trajectory import Trajectory
+
+if has_ompl():
+    from cbrrt_ompl.ompl_plugin.binding import ob
 
 DT = 0.05
 OURS = ["cb-rrt", "s-rrt", "cb-rrt-compiled", "s-rrt-compiled", "cb-rrt-robust"]
@@ -163,6 +166,7 @@ class TestPlans:
         assert end[3:].tolist() == [0.0, 0.0]
         assert np.abs(result.tree.states - end).max(axis=1).min() < 1e-9
 
+    @pytest.mark.needs_ompl
     @pytest.mark.parametrize("planner", ["cb-rrt", "cb-rrt-compiled"])
     def test_the_last_edge_is_one_control_that_ompl_replays(self, planner: str) -> None:
         scenario = Scenario(name="park", world=OPEN, start=State(-3.0, -3.0), goal=PARKED)
@@ -191,6 +195,7 @@ class TestPlans:
         scenario = Scenario(name="park", world=OPEN, start=State(-3.0, -3.0), goal=PARKED, planning=planning)
         assert plan(scenario, "cb-rrt-compiled", seed=1, time_limit=30.0).status == "sample limit"
 
+    @pytest.mark.needs_ompl
     def test_goals_in_position_alone_are_planned_as_in_the_paper(self, scenarios: Path) -> None:
         scenario = load_scenario(scenarios / "paper_case1.yaml")
         without = replace(scenario, planning=replace(scenario.planning, final_approach=False))

@@ -466,8 +466,7 @@ def test_an_occupancy_map_is_its_own() -> None:
     found = OccupancyMap(grid, 0.5)
     grid[0, 0] = X
     assert not found.cells.any()
-    with pytest.raises(ValueError, match="read-only"):
-        found.cells[0, 0] = X
+    assert not found.cells.flags.writeable
     assert found == OccupancyMap.from_array(np.zeros((2, 2), dtype=bool), 0.5) != OccupancyMap(grid, 0.5)
 
 

@@ -20,6 +20,9 @@ FIGURES = {
 }
 """Pictures that a notebook shows at least; those of sliders are theirs and not counted."""
 
+IN_OMPL = ("1_first_plan", "4_benchmark")
+"""Those that plan with OMPL."""
+
 
 def read(name: str) -> Any:
     """A stored notebook."""
@@ -48,7 +51,9 @@ def test_a_notebook_asks_one_question_and_imports_in_its_first_cell(name: str) -
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", NOTEBOOKS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.needs_ompl] if name in IN_OMPL else []) for name in NOTEBOOKS]
+)
 def test_a_notebook_runs_from_top_to_bottom(
     name: str, repository: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

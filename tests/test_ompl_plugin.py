@@ -23,28 +23,33 @@ from cbrrt_ompl import load_scenario, make_setup, plan
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import UnknownPlannerError
 from cbrrt_ompl.motion.model import in_goal
-from cbrrt_ompl.ompl_plugin.binding import ob, oc, ou
-from cbrrt_ompl.ompl_plugin.goals import PoseGoal, make_goal
-from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
-from cbrrt_ompl.ompl_plugin.reals import StateReals, vector_memory
-from cbrrt_ompl.ompl_plugin.results import trajectory_from_path
-from cbrrt_ompl.ompl_plugin.samplers import (
-    ExtensionSampler,
-    KanayamaDirectedControlSampler,
-    SteeringDirectedControlSampler,
-)
-from cbrrt_ompl.ompl_plugin.setup import (
-    equip,
-    make_equipped_setup,
-    make_planner,
-)
-from cbrrt_ompl.ompl_plugin.space import make_state_space, set_state
-from cbrrt_ompl.ompl_plugin.validity import FclStateValidityChecker
+from cbrrt_ompl.ompl_plugin.availability import has_ompl
 from cbrrt_ompl.planners.registry import PLANNERS, Backend
 from cbrrt_ompl.problem.obstacles import Bounds, Box
 from cbrrt_ompl.problem.robot import Limits
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.scenario.scenario import Scenario
+
+if has_ompl():
+    from cbrrt_ompl.ompl_plugin.binding import ob, oc, ou
+    from cbrrt_ompl.ompl_plugin.goals import PoseGoal, make_goal
+    from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
+    from cbrrt_ompl.ompl_plugin.reals import StateReals, vector_memory
+    from cbrrt_ompl.ompl_plugin.results import trajectory_from_path
+    from cbrrt_ompl.ompl_plugin.samplers import (
+        ExtensionSampler,
+        KanayamaDirectedControlSampler,
+        SteeringDirectedControlSampler,
+    )
+    from cbrrt_ompl.ompl_plugin.setup import (
+        equip,
+        make_equipped_setup,
+        make_planner,
+    )
+    from cbrrt_ompl.ompl_plugin.space import make_state_space, set_state
+    from cbrrt_ompl.ompl_plugin.validity import FclStateValidityChecker
+else:
+    pytest.skip("all of it needs OMPL", allow_module_level=True)
 
 BOUNDS = Bounds((0.0, 0.0), (10.0, 10.0))
 EASY = Scenario(

@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 import cbrrt_ompl
 
@@ -33,10 +35,22 @@ def project(repository: Path) -> dict[str, Any]:
     return table
 
 
+@pytest.fixture(scope="module")
+def locked(repository: Path) -> list[Requirement]:
+    """The lines of the lock."""
+    lines = (repository / "requirements.lock").read_text(encoding="utf-8").splitlines()
+    return [Requirement(line) for line in lines if not line.startswith("#")]
+
+
+def same_name(first: Requirement, second: Requirement) -> bool:
+    return canonicalize_name(first.name) == canonicalize_name(second.name)
+
+
 def run_python(code: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
 
 
+@pytest.mark.needs_ompl
 @pytest.mark.parametrize(
     ("ending", "exit_code"),
     [("pass", 0), ("sys.exit(0)", 0), ("sys.exit(3)", 3), ("raise RuntimeError('on purpose')", 1)],
@@ -49,6 +63,7 @@ def test_a_process_that_imported_ompl_ends_with_its_own_exit_code(ending: str, e
     assert ("on purpose" in done.stderr) == (exit_code == 1)
 
 
+@pytest.mark.needs_ompl
 def test_a_process_that_planned_ends_with_its_own_exit_code(scenarios: Path) -> None:
     code = f"""import sys, cbrrt_ompl
 result = cbrrt_ompl.plan(cbrrt_ompl.load_scenario({str(scenarios / "paper_case1.yaml")!r}), time_limit=0.05)
@@ -92,5 +107,31 @@ def test_every_third_party_import_is_a_declared_dependency(repository: Path, pro
             elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
                 imported.add(node.module.split(".")[0])
     third_party = imported - sys.stdlib_module_names - {"cbrrt_ompl"}
-    declared = {re.split("[=>]", line)[0].lower() for line in project["dependencies"]}
+    declared = {Requirement(line).name.lower() for line in project["dependencies"]}
     assert {DISTRIBUTIONS.get(name, name) for name in third_party} <= declared
+
+
+def test_no_dependency_is_declared_twice(project: dict[str, Any]) -> None:
+    for lines in (project["dependencies"], *project["optional-dependencies"].values()):
+        names = [(Requirement(line).name, *Requirement(line).extras) for line in lines]
+        assert len(names) == len(set(names))
+
+
+def test_the_lock_holds_one_version_of_everything_for_every_python(locked: list[Requirement]) -> None:
+    """Names and versions alone: a line that named a registry would be no requirement, or one with an address."""
+    assert all(re.fullmatch(r"==[\w.+!]+", str(line.specifier)) and line.url is None for line in locked)
+    for minor in range(10, 15):
+        here = {"python_version": f"3.{minor}", "python_full_version": f"3.{minor}.9"}
+        names = [line.name for line in locked if line.marker is None or line.marker.evaluate(here)]
+        assert len(names) == len(set(names))
+        assert ("ompl" in names) == (minor <= 12)
+
+
+def test_the_lock_keeps_to_the_ranges_of_the_project(project: dict[str, Any], locked: list[Requirement]) -> None:
+    """Where it does not: make lock."""
+    extras = project["optional-dependencies"]
+    for wanted in map(Requirement, project["dependencies"] + extras["test"] + extras["docs"] + extras["distributed"]):
+        versions = [next(iter(line.specifier)).version for line in locked if same_name(line, wanted)]
+        assert versions or wanted.name == "cbrrt-ompl", wanted.name
+        if wanted.marker is None:
+            assert all(wanted.specifier.contains(version) for version in versions), wanted.name

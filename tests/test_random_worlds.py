@@ -36,6 +36,7 @@ def straight() -> dict[str, Any]:
     return {**columns, "v_command": np.ones(41), "omega_command": zero}
 
 
+@pytest.mark.needs_ompl
 @pytest.mark.slow
 def test_every_trajectory_called_solved_passes_both_checkers() -> None:
     counts: Counter[str] = Counter()

@@ -26,6 +26,7 @@ def blocks(text: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
 
 
+@pytest.mark.needs_ompl
 def test_the_example_runs_and_finds_a_valid_trajectory(
     readme: str, repository: Path, scenarios: Path, tmp_path: Path
 ) -> None:

@@ -70,6 +70,7 @@ def row_of(table: str, first: str) -> list[str]:
     return [cell.strip() for cell in line.strip("|").split("|")]
 
 
+@pytest.mark.needs_ompl
 def test_readings_are_compared_in_medians_and_failures(page: str) -> None:
     table = section(page, "Readings")
     assert row_of(table, "ours")[1].startswith("409 ")
@@ -80,12 +81,14 @@ def test_readings_are_compared_in_medians_and_failures(page: str) -> None:
     assert "readings.png" in table
 
 
+@pytest.mark.needs_ompl
 def test_other_scenes_are_those_that_were_run(page: str) -> None:
     table = section(page, "Other scenes")
     rows = [line for line in table.splitlines() if line.startswith("|")][2:]
     assert len(rows) == 2
 
 
+@pytest.mark.needs_ompl
 def test_the_naive_rrt_is_compared_with_ours(page: str) -> None:
     row = row_of(section(page, "A naive RRT in five dimensions").replace("`", ""), f"Case 1 | {NAIVE}")
     assert row[2] == "20"
@@ -93,12 +96,14 @@ def test_the_naive_rrt_is_compared_with_ours(page: str) -> None:
     assert float(row[7].split()[0]) == pytest.approx(10.0, rel=0.01)
 
 
+@pytest.mark.needs_ompl
 def test_kinds_of_nearest_neighbours_are_compared_by_query_and_by_plan(page: str) -> None:
     tables = section(page, "k-d tree against brute force")
     assert row_of(tables, "228")[1:] == ["50.0", "200", "800", "4.00"]
     assert row_of(tables, "Case 2")[4].startswith("3")
 
 
+@pytest.mark.needs_ompl
 def test_runs_that_are_missing_are_named(page: str) -> None:
     assert "**Missing:** runs of case 1 sst: its process crashed." in page
 

@@ -292,6 +292,7 @@ def test_steering_asks_for_more_acceleration_than_there_is_and_the_law_does_not(
     assert jump > 10.0
 
 
+@pytest.mark.needs_ompl
 def test_the_naive_rrt_weighs_all_components(gap: Scenario) -> None:
     crowded = replace(gap, planning=replace(gap.planning, max_samples=300))
     naive, plane = plan_naively(crowded, 1), plan(crowded, "rrt", 1)
@@ -365,6 +366,7 @@ def small_study(runs: int, brief: bool = False) -> Sequence[Series]:
     return [series for series in make_study(runs, brief=True) if series.key in wanted]
 
 
+@pytest.mark.needs_ompl
 @pytest.mark.slow
 def test_an_interrupted_reproduction_goes_on_and_its_page_needs_no_other_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -409,6 +411,7 @@ def test_numbers_that_make_no_sense_are_refused(tmp_path: Path, arguments: dict[
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.needs_ompl
 def test_the_naive_planner_is_measured_and_no_planner_of_the_package() -> None:
     (part,) = parts_of(Series(Key(CASE_1, "", NAIVE), small_scene(), 1), (7,))
     (run,) = measure(part)

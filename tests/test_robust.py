@@ -24,11 +24,14 @@ from cbrrt_ompl import (
     verify,
 )
 from cbrrt_ompl.motion.model import make_model
-from cbrrt_ompl.ompl_plugin.compiled_planner import CompiledPlanner
+from cbrrt_ompl.ompl_plugin.availability import has_ompl
 from cbrrt_ompl.planners.growth import tolerated_failures
 from cbrrt_ompl.planners.registry import law_of
 from cbrrt_ompl.planners.search import Search
 from cbrrt_ompl.problem.settings import NEAREST_NEIGHBOUR
+
+if has_ompl():
+    from cbrrt_ompl.ompl_plugin.compiled_planner import CompiledPlanner
 
 ROBUST = "cb-rrt-robust"
 
@@ -119,6 +122,7 @@ def test_half_the_samples_of_the_plain_planner_do_in_the_maze(scenarios: Path) -
     assert 2.0 * medians[ROBUST] < medians["cb-rrt-compiled"]
 
 
+@pytest.mark.needs_ompl
 def test_the_planner_of_ompl_grows_the_same_tree(blind_alley: Scenario) -> None:
     settings = replace(blind_alley.planning, max_samples=500)
     scenario = replace(blind_alley, goal=Goal(4.0, 0.0, tolerance=1e-9), planning=settings)

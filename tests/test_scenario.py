@@ -21,6 +21,7 @@ from cbrrt_ompl.errors import InputError, Problem, ScenarioError
 from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, Obstacle, OrientedBox, Polygon
 from cbrrt_ompl.problem.robot import Footprint, Gains, Limits, Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
+from cbrrt_ompl.scenario import plain_yaml
 from cbrrt_ompl.scenario.plain_yaml import MAX_DEPTH, MAX_FILE_SIZE, parse_yaml, resolve
 from cbrrt_ompl.scenario.scenario import (
     MapSource,
@@ -435,10 +436,10 @@ def test_a_mistake_is_one_line_that_names_it(tmp_path: Path, old: str, new: str,
     assert complaints(tmp_path, changed(old, new)) == [complaint]
 
 
-def test_a_polygon_that_crosses_itself_is_named_with_the_place(tmp_path: Path) -> None:
+def test_a_polygon_that_crosses_itself_is_named_with_the_reason(tmp_path: Path) -> None:
     (line,) = complaints(tmp_path, changed("[0.5, 2]]", "[0.5, 2], [0.1, 0]]"))
     assert line.startswith("obstacles[2].vertices: got [")
-    assert "expected a simple polygon with an area (self-intersection" in line
+    assert "expected a simple polygon with an area (" in line
 
 
 UNREADABLE: dict[str, tuple[str | bytes, str]] = {
@@ -456,8 +457,8 @@ UNREADABLE: dict[str, tuple[str | bytes, str]] = {
     "alias": ("start: &a {x: 1}\ngoal: *a\n", "goal: got the alias *a, expected the value itself"),
     "alias of itself": ("&a [*a]", "[0]: got the alias *a, expected the value itself"),
     "key that is a list": ("? [1]\n: 2\n", "got a key that is no name, expected names as keys"),
-    "deep nesting": ("[" * 100_000, "[0][0]"),
-    "deep mappings": ("{a: " * 100_000, "a.a.a"),
+    "deep nesting": ("[" * 100_000, f"{'[0]' * MAX_DEPTH}: got deeper nesting, expected at most {MAX_DEPTH} levels"),
+    "deep mappings": ("{a: " * 100_000, f"{'.'.join('a' * MAX_DEPTH)}: got deeper nesting, expected at most "),
 }
 
 
@@ -468,6 +469,48 @@ def test_what_is_no_scenario_file_is_one_line(tmp_path: Path, text: str | bytes,
         assert found.split(", expected ")[1][:10] == start.split(", expected ")[1][:10]
     else:
         assert found.startswith(start)
+
+
+class _StrictLoader(yaml.SafeLoader):
+    """A PyYAML to come that gives up just behind our own limit, while it reads ahead."""
+
+    def fetch_flow_collection_start(self, token: Any) -> None:
+        if self.flow_level > MAX_DEPTH:
+            raise yaml.scanner.ScannerError("in a list", self.get_mark(), "words of a library", self.get_mark())
+        super().fetch_flow_collection_start(token)
+
+
+class _SilentLoader(yaml.SafeLoader):
+    """A PyYAML to come whose errors tell no place."""
+
+    def fetch_flow_collection_start(self, token: Any) -> None:
+        raise yaml.YAMLError("words\nof a library")
+
+
+@pytest.mark.parametrize("loader", [getattr(yaml, "CSafeLoader", yaml.SafeLoader), yaml.SafeLoader, _StrictLoader])
+@pytest.mark.parametrize(
+    ("start", "path"),
+    [
+        ("", "[0]" * MAX_DEPTH),
+        ("a: 1\nb: ", "b" + "[0]" * (MAX_DEPTH - 1)),
+        ("a: [1, [2], '[[''[[', \"[[\\\"[[\", it's, ", "a[5]" + "[0]" * (MAX_DEPTH - 2)),
+    ],
+)
+def test_our_limit_of_nesting_answers_before_one_of_pyyaml(
+    monkeypatch: pytest.MonkeyPatch, loader: type, start: str, path: str
+) -> None:
+    """PyYAML 6.0.4 gave up at 1,000 open brackets in a line before it had reported the first of them."""
+    monkeypatch.setattr(plain_yaml, "_LOADER", loader)
+    with pytest.raises(InputError) as caught:
+        parse_yaml(start + "[" * 5000, [])
+    assert str(caught.value) == f"{path}: got deeper nesting, expected at most {MAX_DEPTH} levels"
+
+
+def test_an_error_of_pyyaml_without_a_place_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(plain_yaml, "_LOADER", _SilentLoader)
+    with pytest.raises(InputError) as caught:
+        parse_yaml("a: [1]", [])
+    assert str(caught.value) == "got 'a: [1]', expected valid YAML (words of a library)"
 
 
 def test_a_billion_laughs_are_refused(tmp_path: Path) -> None:

@@ -67,6 +67,7 @@ def assert_same(found: PlanResult, alone: PlanResult) -> None:
     assert np.array_equal(found.tree.states, alone.tree.states)
 
 
+@pytest.mark.needs_ompl
 def test_plans_of_many_threads_are_those_of_one(scenario: Scenario, hasty_threads: None) -> None:
     alone = [plan_without_clock(scenario, *job) for job in JOBS]
     assert sum(result.solved for result in alone) > len(JOBS) / 2
@@ -128,6 +129,7 @@ def test_threads_share_the_scene_and_have_a_referee_each(scenario: Scenario) -> 
     assert theirs is not world.referee(footprint)
 
 
+@pytest.mark.needs_ompl
 def test_plans_of_many_processes_are_those_of_one(scenario: Scenario) -> None:
     jobs = [("cb-rrt-compiled", 1), ("cb-rrt", 2), ("cb-rrt-robust", 1)]
     alone = [plan_without_clock(scenario, *job) for job in jobs]
@@ -137,6 +139,7 @@ def test_plans_of_many_processes_are_those_of_one(scenario: Scenario) -> None:
             assert_same(future.result(timeout=120.0), expected)
 
 
+@pytest.mark.needs_ompl
 def test_a_plan_within_the_progress_of_another_does_not_wait_for_it(scenario: Scenario) -> None:
     inner: list[PlanResult] = []
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
@@ -114,8 +115,7 @@ def test_arrays_are_copies_and_read_only() -> None:
     trajectory = Trajectory(t, t, t, t, t, t, t, t)
     t[0] = 0.5
     assert trajectory.t[0] == 0.0
-    with pytest.raises(ValueError, match="read-only"):
-        trajectory.x[0] = 1.0
+    assert not trajectory.x.flags.writeable
     with pytest.raises(FrozenInstanceError):
         trajectory.x = t  # type: ignore[misc]
 
@@ -321,7 +321,7 @@ def json_without(name: str, **others: object) -> str:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('{"t": [0.0, 1', "line 1, column 14: got .*, expected whole and valid JSON"),
+        ('{"t": [0.0, 1', r"line 1, column \d+: got .*, expected whole and valid JSON"),
         ("[1, 2]", r"got \[1, 2\], expected an object with t, x"),
         ("[" * 100_000, "expected .*JSON"),
         (json_without("omega"), "omega: missing, expected the entries t, x"),
@@ -400,7 +400,7 @@ def test_an_unknown_suffix_is_refused_with_the_known_ones(tmp_path: Path, name: 
 
 
 def test_a_missing_folder_and_a_folder_as_file_cannot_be_written_or_read(tmp_path: Path) -> None:
-    with pytest.raises(TrajectoryError, match="No such file or directory.*, expected a file that can be written"):
+    with pytest.raises(TrajectoryError, match=f"{os.strerror(errno.ENOENT)}.*, expected a file that can be written"):
         arc().save(tmp_path / "none" / "a.csv")
     (tmp_path / "folder.csv").mkdir()
     with pytest.raises(TrajectoryError, match="expected a file that can be written"):

@@ -20,6 +20,7 @@ from cbrrt_ompl.benchmark.log import Log, format_log, merge_logs, read_log
 from cbrrt_ompl.errors import CbrrtError, InputError, Problem, SettingsError
 from cbrrt_ompl.files import write_file
 from cbrrt_ompl.motion.model import check_step
+from cbrrt_ompl.ompl_plugin.availability import check_ompl
 from cbrrt_ompl.planners.registry import planner_named
 from cbrrt_ompl.scenario.scenario import Scenario, load_scenario, scenario_to_dict
 
@@ -153,9 +154,11 @@ def run_campaign(
 
     Raises:
         InputError: if the database's file is something else.
+        OmplMissingError: if there is no OMPL.
         CbrrtError: if another campaign is using the folder.
         OSError: if nothing can be written there.
     """
+    check_ompl("the benchmark")
     check_replaceable(database)
     case_dir = log_dir / "cases"
     case_dir.mkdir(parents=True, exist_ok=True)

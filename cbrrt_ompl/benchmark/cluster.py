@@ -59,7 +59,7 @@ def _connect(distributed: Any, stack: ExitStack, address: str, jobs: int) -> Any
     try:
         return stack.enter_context(distributed.Client(address, timeout=CONNECT_TIMEOUT))
     except (OSError, ValueError) as error:
-        raise CbrrtError(f"no scheduler at {address}: {error}") from None
+        raise CbrrtError(f"no scheduler at {address}: {' '.join(str(error).split())}") from None
 
 
 def _outcome(future: Any) -> Outcome:

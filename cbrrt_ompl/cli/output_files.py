@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from cbrrt_ompl.errors import CbrrtError, InputError, Problem
+from cbrrt_ompl.errors import InputError, Problem
 
 SUFFIXES = {
     "trajectory": (".csv", ".npz", ".json"),
@@ -86,9 +86,9 @@ def check_backend() -> None:
     """Import matplotlib, which refuses a wrong MPLBACKEND.
 
     Raises:
-        CbrrtError: if it does.
+        InputError: if it does.
     """
     try:
         import matplotlib  # noqa: F401  # the import is the check
-    except ValueError as error:
-        raise CbrrtError(f"MPLBACKEND: {error}") from None
+    except ValueError:
+        raise InputError(Problem("MPLBACKEND", os.environ.get("MPLBACKEND"), "a backend of matplotlib")) from None

@@ -8,6 +8,9 @@ from cbrrt_ompl.cli.arguments import Commands, add_command, add_json
 from cbrrt_ompl.cli.exit_codes import DONE
 from cbrrt_ompl.cli.output import print_json, print_values
 
+NOT_AVAILABLE = " [not available: no OMPL]"
+"""What is added to the description of a planner that cannot plan here."""
+
 
 def add_parser(commands: Commands) -> None:
     """Add the command to the grammar."""
@@ -17,9 +20,14 @@ def add_parser(commands: Commands) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """``cbrrt planners``."""
     from cbrrt_ompl.planners.registry import PLANNERS
+    from cbrrt_ompl.planning import available_planners
 
+    available = available_planners()
+    planners = {
+        name: planner.description + ("" if name in available else NOT_AVAILABLE) for name, planner in PLANNERS.items()
+    }
     if arguments.json:
-        print_json({name: row.description for name, row in PLANNERS.items()})
+        print_json(planners)
     else:
-        print_values({name: row.description for name, row in PLANNERS.items()})
+        print_values(planners)
     return DONE

@@ -8,6 +8,9 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
+LINE = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}<{remaining}, {rate_fmt}]"
+"""A progress line: how many of how many, the time since the beginning and the time left."""
+
 
 def warm_up(planner: str) -> None:
     """Load the kernels of a planner, and say so on a terminal where they must be compiled first."""
@@ -32,7 +35,8 @@ def plan_progress(total: int, label: str) -> Iterator[Callable[[int, float], Non
         return
     from tqdm import tqdm
 
-    with tqdm(total=total, desc=label, unit=" samples", delay=1.0, leave=False, file=sys.stderr) as bar:
+    look = {"desc": label, "unit": " samples", "delay": 1.0, "leave": False, "bar_format": LINE}
+    with tqdm(total=total, file=sys.stderr, **look) as bar:
 
         def report(samples: int, elapsed: float) -> None:
             bar.update(samples - bar.n)
@@ -53,7 +57,8 @@ def run_progress(total: int) -> Iterator[Callable[[int], None]]:
 
         def report(done: int) -> None:
             if not bars:  # what former calls have done tells nothing of the time left
-                bars.append(tqdm(total=total, initial=done, desc="runs", unit="", smoothing=0.0, file=sys.stderr))
+                look = {"desc": "runs", "unit": "", "smoothing": 0.0, "bar_format": LINE}
+                bars.append(tqdm(total=total, initial=done, file=sys.stderr, **look))
                 stack.enter_context(bars[0])
             bars[0].update(done - bars[0].n)
 

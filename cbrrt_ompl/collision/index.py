@@ -137,9 +137,9 @@ def _build(
     cells = _new_cells(max(2 * roots * roots, 64))
     used = roots * roots
     waiting = np.empty((4 * (levels + 64), 7))  # level, column and row or cell, centre, the list of its parent
-    candidates = np.empty(max(64, 8 * len(pieces)), dtype=np.int32)
+    candidates: NDArray[np.int32] = np.empty(max(64, 8 * len(pieces)), dtype=np.int32)
     distances = np.empty(len(pieces))
-    listed = np.empty(max(64, 4 * len(pieces)), dtype=np.int32)
+    listed: NDArray[np.int32] = np.empty(max(64, 4 * len(pieces)), dtype=np.int32)
     count = 0
     for i in range(parts, len(pieces)):
         candidates[i - parts] = i

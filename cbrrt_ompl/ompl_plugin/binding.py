@@ -9,6 +9,12 @@ from __future__ import annotations
 
 import sys
 
+from cbrrt_ompl.errors import OmplMissingError
+from cbrrt_ompl.ompl_plugin.availability import has_ompl
+
+if not has_ompl():
+    raise OmplMissingError("cbrrt_ompl.ompl_plugin")
+
 import ompl
 
 if sys.platform == "linux" and "ompl.base" not in sys.modules:

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from cbrrt_ompl.figures.figures import draw_plan, draw_velocities
 from cbrrt_ompl.files import save_figure, write_file
+from cbrrt_ompl.ompl_plugin.availability import has_ompl
 from cbrrt_ompl.planning import PlanResult, plan
 from cbrrt_ompl.reproduce.published import PAPER, Published
 from cbrrt_ompl.scenario.scenario import Scenario, load_scenario, scenario_path
@@ -25,6 +26,9 @@ WARM_UP = 0.01
 
 REPRODUCTION_RUNS = 8
 """Runs of each planner in each scene of the short report at the end."""
+
+SUFFIXES = ("", "-compiled")
+"""What is added to the paper's names of the planners: inside OMPL, and without it."""
 
 Watch: TypeAlias = Callable[[int, str], AbstractContextManager[Callable[[int, float], None] | None]]
 """Makes the progress report of one run from its number of samples at most and its name."""
@@ -94,6 +98,8 @@ class DemoRun:
 def run_demo(output: Path, seed: int | None, watch: Watch) -> Iterator[DemoRun]:
     """Run both planners on both scenes and write what each run gives.
 
+    Without OMPL the compiled planners run alone.
+
     Args:
         output: folder that takes the scenarios, trajectories (CSV), figures (PNG) and the table (Markdown).
         seed: seed of every run.
@@ -102,7 +108,7 @@ def run_demo(output: Path, seed: int | None, watch: Watch) -> Iterator[DemoRun]:
     Yields:
         Each run when it is done and written.
     """
-    pairs = [(scene, planner + suffix) for scene, planner in PAPER for suffix in ("", "-compiled")]
+    pairs = [(scene, planner + suffix) for scene, planner in PAPER for suffix in SUFFIXES if has_ompl() or suffix]
     scenarios = {}
     for scene, planner in pairs:
         if scene not in scenarios:

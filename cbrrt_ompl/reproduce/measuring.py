@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cbrrt_ompl.ompl_plugin.run import Found, run
 from cbrrt_ompl.planning import plan
 from cbrrt_ompl.problem.robot import Limits
 from cbrrt_ompl.reproduce.study import NAIVE, Part
 from cbrrt_ompl.scenario.scenario import Scenario, scenario_from_dict
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.verification import verify
+
+if TYPE_CHECKING:
+    from cbrrt_ompl.ompl_plugin.run import Found
 
 TIME_LIMIT = 300.0
 """Planning time that a run may take [s]; the paper's limit is the number of samples."""
@@ -97,6 +99,7 @@ def plan_naively(scenario: Scenario, seed: int) -> Found:
         scenario: world, robot, start, goal; its ``max_samples`` is obeyed.
         seed: 0 or more.
     """
+    from cbrrt_ompl.ompl_plugin.run import run  # here, so that the compiled planners need no OMPL
 
     def weigh_all(setup: Any) -> None:
         for component in range(setup.getStateSpace().getSubspaceCount()):

@@ -11,6 +11,7 @@ from pathlib import Path
 from cbrrt_ompl.benchmark.local import available_cores
 from cbrrt_ompl.errors import Problem, SettingsError
 from cbrrt_ompl.files import write_file, write_files
+from cbrrt_ompl.ompl_plugin.availability import check_ompl
 from cbrrt_ompl.planners.nearest import KINDS
 from cbrrt_ompl.reproduce.grids import CELLS, PLACES, RULES, GridStudy, study_grids
 from cbrrt_ompl.reproduce.machine import machine, versions
@@ -78,6 +79,7 @@ def reproduce(
 
     Raises:
         SettingsError: if a number makes no sense.
+        OmplMissingError: if there is no OMPL.
         CbrrtError: if another process is using the folder.
         OSError: if nothing can be written there.
     """
@@ -88,6 +90,7 @@ def reproduce(
     ]
     if problems:
         raise SettingsError(problems)
+    check_ompl("the reproduction")
     jobs = jobs or available_cores()
     (output / PICTURES).mkdir(parents=True, exist_ok=True)
     study = make_study(runs, brief)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -17,12 +18,18 @@ from typing import Any
 import yaml
 
 from cbrrt_ompl.errors import InputError, Problem, Remark
+from cbrrt_ompl.files import reason_of
 
 MAX_FILE_SIZE = 16 * 2**20
 """Largest file that is read [bytes]."""
 
 MAX_DEPTH = 20
 """Deepest nesting of lists and mappings that is read."""
+
+_BRACKETS = re.compile(
+    r"""(?<![^\s\[\]{},:])(?:"(?:[^"\\]|\\.)*"|'(?:[^']|'')*')|(?P<opening>[\[{])|(?P<closing>[\]}])""", re.DOTALL
+)
+"""The brackets of a text inside lists and mappings; those in quotes are passed over."""
 
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _UNREADABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -54,8 +61,7 @@ def read_yaml(path: Path, problems: list[Problem]) -> object:
         with path.open("rb") as file:
             content = file.read(MAX_FILE_SIZE + 1)
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(Problem("", Remark(reason), "a file that can be read")) from None
+        raise InputError(Problem("", Remark(reason_of(error)), "a file that can be read")) from None
     if len(content) > MAX_FILE_SIZE:
         raise InputError(Problem("", Remark("a larger file"), f"at most {MAX_FILE_SIZE} bytes"))
     try:
@@ -74,8 +80,33 @@ def parse_yaml(text: str, problems: list[Problem]) -> object:
         raise InputError(Problem(f"line {line}, column {column}", unreadable[0], "printable characters"))
     try:
         return _Builder(yaml.parse(text, Loader=_LOADER), problems).document()
-    except yaml.MarkedYAMLError as error:
+    except yaml.YAMLError as error:
+        _refuse_deep_nesting(text)
         raise InputError(_syntax_problem(error, text)) from None
+
+
+def _refuse_deep_nesting(text: str) -> None:
+    """Say so where a text that PyYAML refuses is nested too deeply.
+
+    PyYAML reads a thousand characters of a line ahead of the list that it reports, in case it is a key, and may end at
+    a limit of its own there. Without the rest of the text nothing is left to read ahead.
+
+    Raises:
+        InputError: if lists and mappings are nested too deeply up to the place of the error.
+    """
+    depth = end = 0
+    try:
+        for event in yaml.parse(text, Loader=_LOADER):
+            depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+            end = event.end_mark.index if event.end_mark else end
+    except yaml.YAMLError:
+        pass
+    for bracket in _BRACKETS.finditer(text, end):
+        depth += (bracket["opening"] is not None) - (bracket["closing"] is not None)
+        if depth > MAX_DEPTH:
+            with suppress(yaml.YAMLError):
+                _Builder(yaml.parse(text[: bracket.end()], Loader=_LOADER), []).document()
+            return
 
 
 def resolve(text: str) -> object:
@@ -198,11 +229,14 @@ def _place(text: str, position: int) -> tuple[int, int]:
     return text.count("\n", 0, position) + 1, position - text.rfind("\n", 0, position)
 
 
-def _syntax_problem(error: yaml.MarkedYAMLError, text: str) -> Problem:
+def _syntax_problem(error: yaml.YAMLError, text: str) -> Problem:
     """The place, the line and the reason of a YAML syntax error."""
-    mark = error.problem_mark or error.context_mark
+    context, problem, *marks = (
+        getattr(error, name, None) for name in ("context", "problem", "problem_mark", "context_mark")
+    )
+    mark = next(filter(None, marks), None)
     lines = text.splitlines() or [""]
     number = min(mark.line, len(lines) - 1) if mark else 0
     where = f"line {mark.line + 1}, column {mark.column + 1}" if mark else ""
-    reason = ": ".join(part for part in (error.context, error.problem) if part)
-    return Problem(where, lines[number].strip(), f"valid YAML ({reason})")
+    reason = ": ".join(part for part in (context, problem) if part) or str(error)
+    return Problem(where, lines[number].strip(), f"valid YAML ({' '.join(reason.split())})")
