@@ -8,6 +8,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from cbrrt_ompl.one_libompl import load_one_libompl
+
 if TYPE_CHECKING:
     from cbrrt_ompl.collision.world import World
     from cbrrt_ompl.errors import CbrrtError, InputError
@@ -77,6 +79,8 @@ _MODULES = {
     "verification": ("verify",),
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names}
+
+load_one_libompl()
 
 
 def __getattr__(name: str) -> Any:
