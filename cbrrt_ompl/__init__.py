@@ -14,7 +14,13 @@ if TYPE_CHECKING:
     from cbrrt_ompl.collision.world import World
     from cbrrt_ompl.errors import CbrrtError, InputError
     from cbrrt_ompl.maps import OccupancyMap, load_dynobench, load_map, save_map
+    from cbrrt_ompl.ompl_plugin.own_sampler import with_directed_sampler
+    from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
+    from cbrrt_ompl.ompl_plugin.results import trajectory_from_path
+    from cbrrt_ompl.ompl_plugin.samplers import KanayamaDirectedControlSampler, SteeringDirectedControlSampler
     from cbrrt_ompl.ompl_plugin.setup import make_setup
+    from cbrrt_ompl.ompl_plugin.space import make_control_space, make_state_space, read_state, write_state
+    from cbrrt_ompl.ompl_plugin.validity import FclStateValidityChecker
     from cbrrt_ompl.planning import PlanResult, plan
     from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, OrientedBox, Polygon
     from cbrrt_ompl.problem.ready_robots import ROBOTS
@@ -33,10 +39,12 @@ __all__ = [
     "Box",
     "CbrrtError",
     "Disc",
+    "FclStateValidityChecker",
     "Footprint",
     "Gains",
     "Goal",
     "InputError",
+    "KanayamaDirectedControlSampler",
     "Limits",
     "OccupancyMap",
     "OrientedBox",
@@ -47,25 +55,39 @@ __all__ = [
     "Robot",
     "Scenario",
     "State",
+    "SteeringDirectedControlSampler",
     "Track",
     "Trajectory",
+    "TwoWheelPropagator",
     "World",
     "__version__",
     "load_dynobench",
     "load_map",
     "load_scenario",
     "load_track",
+    "make_control_space",
     "make_setup",
+    "make_state_space",
     "plan",
+    "read_state",
     "save_map",
     "save_scenario",
+    "trajectory_from_path",
     "verify",
+    "with_directed_sampler",
+    "write_state",
 ]
 
 _MODULES = {
     "collision.world": ("World",),
     "errors": ("CbrrtError", "InputError"),
+    "ompl_plugin.own_sampler": ("with_directed_sampler",),
+    "ompl_plugin.propagators": ("TwoWheelPropagator",),
+    "ompl_plugin.results": ("trajectory_from_path",),
+    "ompl_plugin.samplers": ("KanayamaDirectedControlSampler", "SteeringDirectedControlSampler"),
     "ompl_plugin.setup": ("make_setup",),
+    "ompl_plugin.space": ("make_control_space", "make_state_space", "read_state", "write_state"),
+    "ompl_plugin.validity": ("FclStateValidityChecker",),
     "planning": ("PlanResult", "plan"),
     "problem.obstacles": ("Bounds", "Box", "Disc", "OrientedBox", "Polygon"),
     "problem.ready_robots": ("ROBOTS",),

@@ -32,7 +32,7 @@ class _BeforeOmpl:
         """Called by Python's import with the full name of every module that is not imported yet."""
         if name.startswith("ompl.") and "ompl" in sys.modules:
             sys.modules["ompl"].dll_loader = lambda *_: None  # type: ignore[attr-defined]
-            sys.meta_path.remove(self)  # type: ignore[arg-type]
+            sys.meta_path.remove(self)
 
 
 def _exit_without_destructors() -> None:

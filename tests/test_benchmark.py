@@ -20,6 +20,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from cbrrt_ompl.collision.clearance_map import ClearanceMap
 
 from cbrrt_ompl import Scenario, load_scenario, plan
 from cbrrt_ompl.benchmark import campaign as campaign_module
@@ -35,7 +36,6 @@ from cbrrt_ompl.benchmark.experiment import Experiment
 from cbrrt_ompl.benchmark.local import run_locally
 from cbrrt_ompl.benchmark.log import Log, PlannerLog, format_log, merge_logs, parse_log, read_log
 from cbrrt_ompl.cli import main
-from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from cbrrt_ompl.errors import CbrrtError, InputError, SettingsError, UnknownPlannerError
 from cbrrt_ompl.motion.model import OPEN_LOOP, STEERING
 from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
@@ -298,7 +298,7 @@ def test_no_planner_runs_with_the_sampler_or_the_model_of_another(
         return sample(self, *arguments)
 
     def noting_propagate(self: Any, *arguments: Any) -> None:
-        laws[experiment._active.getName()].add(int(self._model[0]))
+        laws[experiment._active.getName()].add(int(self.model[0]))
         propagate(self, *arguments)
 
     monkeypatch.setattr(ExtensionSampler, "sampleTo", counting_sample)

@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from cbrrt_ompl import load_scenario, make_setup, plan
-from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import UnknownPlannerError
 from cbrrt_ompl.motion.model import GoalRegion, in_goal
@@ -35,15 +35,12 @@ from cbrrt_ompl.ompl_plugin.samplers import (
     SteeringDirectedControlSampler,
 )
 from cbrrt_ompl.ompl_plugin.setup import (
-    COMPILED_PLANNERS,
-    OMPL_PLANNERS,
-    SAMPLERS,
     equip,
-    make_equipped_setup,
     make_planner,
 )
-from cbrrt_ompl.ompl_plugin.space import make_state_space, set_state
+from cbrrt_ompl.ompl_plugin.space import make_state_space, write_state
 from cbrrt_ompl.ompl_plugin.validity import FclStateValidityChecker
+from cbrrt_ompl.planners.registry import PLANNERS, Backend
 from cbrrt_ompl.problem.obstacles import Bounds, Box
 from cbrrt_ompl.problem.robot import Limits
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
@@ -58,8 +55,9 @@ EASY = Scenario(
 )
 """A wall to drive around: every planner solves it in a fraction of a second."""
 
-PAPER_PLANNERS = list(SAMPLERS)
-ALL_PLANNERS = [*SAMPLERS, *COMPILED_PLANNERS, *OMPL_PLANNERS]
+PAPER_PLANNERS = [name for name, planner in PLANNERS.items() if planner.backend is Backend.PLUGIN]
+OTHER_PLANNERS = [name for name, planner in PLANNERS.items() if planner.backend is not Backend.PLUGIN]
+ALL_PLANNERS = list(PLANNERS)
 
 
 @pytest.fixture(autouse=True)
@@ -88,7 +86,7 @@ def sampler_calls(monkeypatch: pytest.MonkeyPatch) -> Counter[type]:
 def ompl_state(space: Any, *values: float) -> Any:
     """A scoped state of (x, y, theta, v, omega)."""
     state = ob.State(space)
-    set_state(state(), State(*values))
+    write_state(state, State(*values))
     return state
 
 
@@ -169,11 +167,11 @@ def test_every_edge_of_the_tree_replays_to_the_stored_states(
 
 @pytest.mark.parametrize("planner", PAPER_PLANNERS)
 def test_a_trajectory_passes_through_the_states_of_its_path(planner: str) -> None:
-    setup, equipment = make_equipped_setup(EASY, planner)
+    setup = make_setup(EASY, planner)
     solve(setup, 5000)
     assert setup.haveExactSolutionPath()
     path, space = setup.getSolutionPath(), setup.getStateSpace()
-    trajectory = trajectory_from_path(path, space, equipment.model)
+    trajectory = trajectory_from_path(path, EASY)
     durations = [path.getControlDuration(i) for i in range(path.getControlCount())]
     rows = np.rint(np.cumsum([0.0, *durations]) / EASY.planning.step).astype(int)
     stored = np.array([reals(space, path.getState(i)) for i in range(path.getStateCount())])
@@ -330,12 +328,12 @@ def test_heading_and_speed_at_the_goal_are_obeyed(planner: str) -> None:
 
 
 def allocated(scenario: Scenario, planner: str) -> tuple[Any, ExtensionSampler]:
-    """A set-up, to be kept, and a directed sampler that its space information allocates."""
-    setup, equipment = make_equipped_setup(scenario, planner)
-    setup.setup()
-    setup.getSpaceInformation().allocDirectedControlSampler()
-    assert equipment.sampler is not None
-    return setup, equipment.sampler
+    """A set-up, to be kept, and the directed sampler of its planner."""
+    setup = make_setup(scenario, planner)
+    solve(setup, 0)
+    sampler = setup.getPlanner().sampler
+    assert isinstance(sampler, ExtensionSampler)
+    return setup, sampler
 
 
 def extend(setup: Any, sampler: ExtensionSampler, node: tuple[float, ...], x: float, y: float) -> int:
@@ -407,7 +405,7 @@ def test_a_cut_extension_is_discarded_or_kept_up_to_the_obstacle(cut: str, steps
 # one planner's parts
 
 
-@pytest.mark.parametrize("planner", [*OMPL_PLANNERS, *COMPILED_PLANNERS])
+@pytest.mark.parametrize("planner", OTHER_PLANNERS)
 def test_no_other_planner_calls_a_directed_sampler_of_ours(planner: str, sampler_calls: Counter[type]) -> None:
     solve(make_setup(EASY, planner), 300)
     assert sampler_calls == {}
@@ -421,14 +419,14 @@ def test_a_planner_of_the_paper_calls_its_own_sampler_once_a_round(planner: str,
     assert sampler_calls == {expected[planner]: 300}
 
 
-@pytest.mark.parametrize("planner", [*OMPL_PLANNERS, *COMPILED_PLANNERS])
+@pytest.mark.parametrize("planner", OTHER_PLANNERS)
 def test_equipping_another_planner_takes_the_directed_sampler_away(planner: str, sampler_calls: Counter[type]) -> None:
     """As in OMPL's Benchmark: all planners share one space information."""
     setup = make_setup(replace(EASY, goal=Goal(8.0, 8.0, tolerance=1e-9)), "cb-rrt")
     solve(setup, 10)
     assert sampler_calls.pop(KanayamaDirectedControlSampler) == 10
     si, clearance_map = setup.getSpaceInformation(), ClearanceMap(EASY.world, EASY.robot.footprint)
-    equip(si, setup.getStateSpace(), EASY, planner, clearance_map)
+    equip(si, EASY, planner, clearance_map)
     setup.setPlanner(make_planner(si, EASY, planner, clearance_map))
     solve(setup, 100)
     assert sampler_calls == {}

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from cbrrt_ompl.checks import LARGEST, is_number
 from cbrrt_ompl.ompl_plugin.binding import ob
 from cbrrt_ompl.ompl_plugin.reals import StateReals
-from cbrrt_ompl.ompl_plugin.space import STATE_DIMENSION, set_state
+from cbrrt_ompl.ompl_plugin.space import STATE_DIMENSION, write_state
 from cbrrt_ompl.problem.settings import Goal, State
 
 _JUST_BELOW_ONE = math.nextafter(1.0, 0.0)
@@ -27,10 +28,26 @@ def make_goal(si: Any, space: Any, goal: Goal) -> Any:
         return PoseGoal(si, space, goal)
     region = ob.GoalState(si)
     centre = ob.State(space)
-    set_state(centre(), centre_state(goal))
+    write_state(centre(), centre_state(goal))
     region.setState(centre())
     region.setThreshold(goal.tolerance)
     return region
+
+
+def region_of(goal: Any, space: Any) -> Goal | None:
+    """A goal of OMPL's as a region that the kernels know; None where only the goal itself can tell.
+
+    That is a `PoseGoal`, and OMPL's `GoalState` in a space whose distance looks at positions alone.
+    """
+    if type(goal) is PoseGoal:
+        return goal.goal if goal.getThreshold() == 1.0 else None
+    if type(goal) is not ob.GoalState or [space.getSubspaceWeight(i) for i in range(3)] != [1.0, 0.0, 0.0]:
+        return None
+    centre = goal.getState()
+    x, y, tolerance = centre[0][0], centre[0][1], goal.getThreshold()
+    if not (is_number(x, LARGEST) and is_number(y, LARGEST) and is_number(tolerance, LARGEST) and tolerance > 0.0):
+        return None
+    return Goal(x, y, tolerance)
 
 
 def centre_state(goal: Goal) -> State:
@@ -43,6 +60,9 @@ class PoseGoal(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no ty
 
     OMPL calls a state satisfied where ``distanceGoal`` is below the threshold of 1: it is the largest of the
     deviations, each divided by its tolerance.
+
+    Attributes:
+        goal: the region.
     """
 
     def __init__(self, si: Any, space: Any, goal: Goal) -> None:
@@ -55,14 +75,14 @@ class PoseGoal(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no ty
         """
         super().__init__(si)
         self.setThreshold(1.0)
-        self._goal = goal
+        self.goal = goal
         self._reals = StateReals(space, STATE_DIMENSION)
 
     def distanceGoal(self, state: Any) -> float:  # noqa: N802  # OMPL's name
         """The largest deviation in units of its tolerance; below 1 exactly where the goal is satisfied."""
         self._reals.read(state)
         values = State(*self._reals.values.tolist())
-        goal = self._goal
+        goal = self.goal
         deviations = [math.hypot(values.x - goal.x, values.y - goal.y) / goal.tolerance]
         if goal.theta is not None:
             deviations.append(abs(math.remainder(values.theta - goal.theta, math.tau)) / goal.heading_tolerance)
@@ -73,7 +93,7 @@ class PoseGoal(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no ty
 
     def sampleGoal(self, state: Any) -> None:  # noqa: N802  # OMPL's name
         """The middle of the region, at rest."""
-        set_state(state, centre_state(self._goal))
+        write_state(state, centre_state(self.goal))
 
     def maxSampleCount(self) -> int:  # noqa: N802  # OMPL's name
         """One: the middle."""
