@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -22,13 +21,12 @@ from numpy.typing import NDArray
 from cbrrt_ompl import load_scenario, make_setup, plan
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import UnknownPlannerError
-from cbrrt_ompl.motion.model import GoalRegion, in_goal
+from cbrrt_ompl.motion.model import OPEN_LOOP, in_goal, make_model
 from cbrrt_ompl.ompl_plugin.binding import ob, oc, ou
 from cbrrt_ompl.ompl_plugin.goals import PoseGoal, make_goal
 from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
 from cbrrt_ompl.ompl_plugin.reals import StateReals, vector_memory
 from cbrrt_ompl.ompl_plugin.results import trajectory_from_path
-from cbrrt_ompl.ompl_plugin.run import run
 from cbrrt_ompl.ompl_plugin.samplers import (
     ExtensionSampler,
     KanayamaDirectedControlSampler,
@@ -42,7 +40,7 @@ from cbrrt_ompl.ompl_plugin.space import make_state_space, write_state
 from cbrrt_ompl.ompl_plugin.validity import FclStateValidityChecker
 from cbrrt_ompl.planners.registry import PLANNERS, Backend
 from cbrrt_ompl.problem.obstacles import Bounds, Box
-from cbrrt_ompl.problem.robot import Limits
+from cbrrt_ompl.problem.robot import Limits, Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.scenario.scenario import Scenario
 
@@ -295,7 +293,7 @@ def test_kernel_and_goal_state_agree_on_the_rim_of_the_goal(angle: float, ulps: 
         distance = math.nextafter(distance, math.copysign(math.inf, ulps))
     x, y = goal.x + distance * math.cos(angle), goal.y + distance * math.sin(angle)
     region = make_goal(SPACE_INFORMATION, SPACE, goal)
-    kernel = GoalRegion(goal.x, goal.y, goal.tolerance, 0.0, math.inf, math.inf)
+    kernel = make_model(OPEN_LOOP, Robot(), goal, PlanningSettings())["goal"][0]
     state = ompl_state(SPACE, x, y, 0.3, 0.1, 0.1)
     assert in_goal(kernel, x, y, 0.3, 0.1, 0.1) == region.isSatisfied(state())
 
@@ -425,9 +423,9 @@ def test_equipping_another_planner_takes_the_directed_sampler_away(planner: str,
     setup = make_setup(replace(EASY, goal=Goal(8.0, 8.0, tolerance=1e-9)), "cb-rrt")
     solve(setup, 10)
     assert sampler_calls.pop(KanayamaDirectedControlSampler) == 10
-    si, clearance_map = setup.getSpaceInformation(), ClearanceMap(EASY.world, EASY.robot.footprint)
-    equip(si, EASY, planner, clearance_map)
-    setup.setPlanner(make_planner(si, EASY, planner, clearance_map))
+    si = setup.getSpaceInformation()
+    equip(si, EASY, planner)
+    setup.setPlanner(make_planner(si, EASY, planner))
     solve(setup, 100)
     assert sampler_calls == {}
 
@@ -479,44 +477,9 @@ def test_plans_leave_no_memory_behind(planner: str) -> None:
     assert resident_memory() - before < 1_000_000
 
 
-# the clearance map behind it
-
-
-@pytest.mark.parametrize("planner", ["cb-rrt", "s-rrt", "rrt"])
-@pytest.mark.parametrize("scene", ["paper_case1", "office"])
-def test_a_plan_is_the_same_whatever_the_clearance_map_holds(scenarios: Path, scene: str, planner: str) -> None:
-    scenario = load_scenario(scenarios / f"{scene}.yaml")
-    scenario = replace(scenario, planning=replace(scenario.planning, max_samples=400))
-    fresh, without = (
-        ClearanceMap(scenario.world, scenario.robot.footprint, enabled=enabled) for enabled in (True, False)
-    )
-    found = [run(scenario, planner, 4, lambda: None, lambda _: False, m).make_tree() for m in (fresh, fresh, without)]
-    assert fresh.cells > 1
-    assert without.cells == 0
-    for other in found[1:]:
-        assert np.array_equal(found[0].states, other.states)
-        assert np.array_equal(found[0].parents, other.parents)
-
-
 def test_the_random_numbers_of_python_are_left_alone() -> None:
     random.seed(5)
     expected = random.random()
     random.seed(5)
     plan(EASY, "cb-rrt", seed=1)
     assert random.random() == expected
-
-
-def test_a_plan_stops_within_an_extension(scenarios: Path) -> None:
-    """A brake-safe extension of a robot with corners can take half a second."""
-    scenario = load_scenario(scenarios / "office.yaml")
-    scenario = replace(scenario, planning=replace(scenario.planning, brake_safe=True))
-    asked = []
-
-    def should_stop(samples: int) -> bool:
-        asked.append(samples)
-        return len(asked) >= 5
-
-    without = ClearanceMap(scenario.world, scenario.robot.footprint, enabled=False)
-    found = run(scenario, "cb-rrt", 1, lambda: None, should_stop, without)
-    assert asked == [0, 1, 1, 1, 1, 1]  # by the main loop, within the first extension, and by the main loop again
-    assert (found.samples, found.nodes, found.trajectory) == (1, 1, None)
