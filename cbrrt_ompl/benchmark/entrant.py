@@ -16,6 +16,7 @@ from cbrrt_ompl.ompl_plugin.setup import (
     first_solution_objective,
     make_planner,
 )
+from cbrrt_ompl.ompl_plugin.space import register_projection
 from cbrrt_ompl.planners.registry import is_compiled
 from cbrrt_ompl.scenario.scenario import Scenario
 
@@ -62,7 +63,7 @@ class Entrant(ob.Planner):  # type: ignore[misc]  # OMPL has no type information
         ou.RNG.setSeed(seed + 1)
         self.planner = self._make(seed)
         space = self._setup.getStateSpace()
-        space.registerDefaultProjection(ob.SubspaceProjectionEvaluator(space, 0))  # the old one knows random bounds
+        register_projection(space)  # the old one knows random bounds
         self.getSpaceInformation().setup()
         self.planner.setProblemDefinition(self._setup.getProblemDefinition())
         self.planner.setup()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numba.extending import overload
 from numpy.typing import NDArray
 
 from cbrrt_ompl.motion.records import Records, record_array
@@ -57,15 +58,16 @@ class Children:
         """Number of children."""
         return int(self.counts["children"][0])
 
-    def make_room(self) -> None:
-        """Have room for one more node and one more child."""
+    def make_room(self) -> bool:
+        """Have room for one more node and one more child; whether the arrays are others now."""
         capacity = len(self.records)
         if max(self.counts[0].tolist()) < capacity:
-            return
+            return False
         old_records, old_parents = self.records, self.parents
         self.records, self.parents = record_array(2 * capacity, CHILD), _empty_table(2 * capacity)
         self.records[:capacity] = old_records
         _move(old_parents, self.parents)
+        return True
 
     def slot(self, node: NDArray[np.float64]) -> int:
         """Where a node of shape (5,) is; it is entered as `UNTRIED` if it was not there."""
@@ -91,15 +93,28 @@ def _empty_table(capacity: int) -> Records:
     return table
 
 
+def hash_of(node: tuple[float, ...]) -> int:
+    """A number that spreads over the slots; in compiled code a quicker one."""
+    return hash(node)
+
+
+@overload(hash_of)
+def _compiled_hash_of(node):  # type: ignore[no-untyped-def]  # numba compares signatures
+    def mix(node):  # type: ignore[no-untyped-def]
+        number = 0
+        for value in node:
+            number = (number ^ bits_of(value)) * _HASH_FACTOR
+            number ^= number >> 29
+        return number
+
+    return mix
+
+
 @njit(cache=True)
 def find_slot(node: tuple[float, float, float, float, float], parents: Records) -> int:
     """The slot of a node, or the empty one that it would get."""
     mask = len(parents) - 1
-    number = 0
-    for value in node:
-        number = (number ^ bits_of(value)) * _HASH_FACTOR
-        number ^= number >> 29
-    i = number & mask
+    i = hash_of(node) & mask
     while True:
         slot = parents[i]
         if slot.first_child == EMPTY or (

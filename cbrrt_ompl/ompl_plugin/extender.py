@@ -30,7 +30,6 @@ EXTENSION = np.dtype(
         ("v_command", np.float64),  # that line 5 compares [m/s, rad/s]
         ("omega_command", np.float64),
         ("control", np.float64, (3,)),  # see advance of the model
-        ("block", STEPS),  # room for the kernel
     ],
     align=True,
 )
@@ -46,6 +45,7 @@ class Extender:
     every step of what they have found.
 
     Attributes:
+        block: room for the kernel, one record of type :data:`cbrrt_ompl.planners.roll_out.STEPS`.
         scene: world and footprint, see :meth:`cbrrt_ompl.World.scene`.
         model: one record, see :func:`cbrrt_ompl.motion.model.make_model`; it stays where it is.
         end: (x, y, theta, v, omega) at the end of the last extension that was `EXTENDED`, shape (5,).
@@ -84,6 +84,7 @@ class Extender:
         self.model = record_array(1, MODEL)
         self._control_dimension = si.getControlSpace().getDimension()
         self._extension = record_array(1, EXTENSION)
+        self.block = record_array(1, STEPS)
         self.look_again()
 
     @property
@@ -162,8 +163,10 @@ class Extender:
         if self._asked is not None:
             return self._ask(self._asked, source, x, y, first_child, children)
         self.end[0], self.end[1] = x, y
-        outcome: int = extend_values(node, self.end, first_child, children, *self.scene, self.model, self._extension)
-        steps, v, omega, control, _ = self._extension[0]
+        outcome: int = extend_values(
+            node, self.end, first_child, children, *self.scene, self.model, self.block, self._extension
+        )
+        steps, v, omega, control = self._extension[0]
         self.steps, self.command, self.control = int(steps), (v, omega), tuple(control.tolist())
         if outcome == EXTENDED and self._goal_finder is not None:
             steps = self._goal_finder.steps_to_goal(source, self.control, self.steps)
@@ -212,13 +215,14 @@ def extend_values(
     pieces: Records,
     corners: Records,
     models: Records,
+    blocks: Records,
     extensions: Records,
 ) -> int:
     """:func:`extend` for a caller in Python: arrays in; the outcome, the end in ``sample`` and a record out."""
     scene, model, found = Scene(frame, cells, pieces, corners), models[0], extensions[0]
     state = (node[0], node[1], node[2], node[3], node[4])
     margin = margin_at(node[0], node[1], node[2], scene, model.room)
-    extension = extend(state, margin, (sample[0], sample[1]), first_child, children, scene, model, found.block)
+    extension = extend(state, margin, (sample[0], sample[1]), first_child, children, scene, model, blocks[0])
     found.steps = extension.steps
     found.v_command, found.omega_command = extension.command
     found.control[0], found.control[1], found.control[2] = extension.control
@@ -230,4 +234,5 @@ def extend_values(
 def warm_up_extender(model: Records, scene: Scene) -> None:
     """Load or compile the kernel."""
     node, sample = np.array([0.5, 0.5, 0.0, 0.0, 0.0]), np.array([0.6, 0.6, 0.0, 0.0, 0.0])
-    extend_values(node, sample, NO_CHILD, record_array(1, CHILD), *scene, model, record_array(1, EXTENSION))
+    block, extension = record_array(1, STEPS), record_array(1, EXTENSION)
+    extend_values(node, sample, NO_CHILD, record_array(1, CHILD), *scene, model, block, extension)

@@ -17,14 +17,14 @@ from cbrrt_ompl.ompl_plugin.native_layout import (
     words_at,
 )
 from cbrrt_ompl.ompl_plugin.native_memory import call_distance, peek_real, pointer, read_position
-from cbrrt_ompl.ompl_plugin.virtual_calls import call_compiled, record_address
+from cbrrt_ompl.ompl_plugin.virtual_calls import call_compiled, call_libompl, record_address
 
 SPACE = "ompl::base::CompoundStateSpace"
+REAL_VECTOR_SPACE = "ompl::base::RealVectorStateSpace"
 SPACE_WRAPPER = "CompoundStateSpace_wrapper"
 DISTANCE = "_ZNK4ompl4base18CompoundStateSpace8distanceEPKNS0_5StateES4_"
 
 NATIVE_CLASSES = {
-    "CompoundStateSpace": SPACE,
     "GoalState": "ompl::base::GoalState",
     "GoalStates": "ompl::base::GoalStates",
     "PathLengthOptimizationObjective": "ompl::base::PathLengthOptimizationObjective",
@@ -32,6 +32,27 @@ NATIVE_CLASSES = {
     "SubspaceProjectionEvaluator": "ompl::base::SubspaceProjectionEvaluator",
 }
 """Classes whose objects made in Python may use libompl's vtable: the name in Python and in C++."""
+
+
+def make_native(python_object: Any) -> Any:
+    """Let virtual calls of an object of one of the `NATIVE_CLASSES` go straight to libompl.
+
+    Objects of derived classes stay as they are.
+
+    Args:
+        python_object: the object, made in Python.
+
+    Returns:
+        The object itself.
+
+    Raises:
+        LayoutError: if it is not laid out as expected.
+    """
+    name = type(python_object).__name__
+    if type(python_object).__module__.startswith("ompl.") and name in NATIVE_CLASSES:
+        call_libompl(python_object, NATIVE_CLASSES[name], f"{name}_wrapper")
+    return python_object
+
 
 SPACE_RECORD = np.dtype([("weights", np.int64), ("distance", np.int64)])
 """What the compiled distance knows: the address of the three weights, and libompl's distance for other weights."""
@@ -50,33 +71,67 @@ def make_space_native(space: Any) -> None:
 
 
 def weights_address(space: Any) -> int:
-    """Address of the weights of a locked compound space of three components: they never move.
-
-    The object is searched for a ``std::vector<double>`` (begin, end, end of storage) that holds them.
+    """Address of the weights of a locked compound space of ours: they never move.
 
     Raises:
         LayoutError: if there is none, or more than one.
     """
     expected = [space.getSubspaceWeight(i) for i in range(space.getSubspaceCount())]
-    size = len(expected) * WORD
-    words = words_at(object_address(space, SPACE), _SPACE_WORDS).tolist()
-    found = [
-        begin
-        for begin, end, storage_end in zip(words, words[1:], words[2:], strict=False)
-        if begin and begin % WORD == 0 and end - begin == size and end <= storage_end <= end + 64 * WORD
-    ]
-    found = [begin for begin in found if _reals_at(begin, len(expected)).tolist() == expected]
+    words = words_at(object_address(space, SPACE), _SPACE_WORDS)
+    found = [begin for _, begin in _vectors(words, len(expected)) if _reals(begin, len(expected)) == expected]
     if len(found) != 1:
         raise LayoutError(f"{len(found)} vectors hold the weights of a compound space instead of one")
-    return int(found[0])
+    return found[0]
+
+
+def bounds_address(space: Any, component: int) -> int:
+    """Address of the bounds of an R^2 in a space of ours: the vector of the lows, and after it that of the highs.
+
+    Raises:
+        LayoutError: if there are none, or several.
+    """
+    subspace = space.getSubspace(component)
+    bounds = subspace.getBounds()
+    address = object_address(subspace, REAL_VECTOR_SPACE)
+    vectors = dict(_vectors(words_at(address, _SPACE_WORDS), 2))
+    found = [
+        offset
+        for offset, begin in vectors.items()
+        if offset + 3 in vectors
+        and _reals(begin, 2) == list(bounds.low)
+        and _reals(vectors[offset + 3], 2) == list(bounds.high)
+    ]
+    if len(found) != 1:
+        raise LayoutError(f"{len(found)} pairs of vectors hold the bounds of an R^2 instead of one")
+    return address + found[0] * WORD
+
+
+def reals_of_bounds(address: int) -> list[list[float]]:
+    """The lows and the highs of an R^2 at an address of :func:`bounds_address`."""
+    words = words_at(address, 4).tolist()
+    return [_reals(words[0], 2), _reals(words[3], 2)]
 
 
 _SPACE_WORDS = 48
-"""Words of a ``CompoundStateSpace`` that are searched; its wrapper is larger."""
+"""Words of a state space that are searched: all of ``StateSpace``, and two vectors more."""
 
 
-def _reals_at(address: int, count: int) -> NDArray[np.float64]:
-    return words_at(address, count).view(np.float64)
+def _vectors(words: NDArray[np.uint64], length: int) -> list[tuple[int, int]]:
+    """What may be a ``std::vector<double>`` of a length: index of its first word, and address of its numbers.
+
+    A vector is three addresses: begin, end, and end of the storage.
+    """
+    numbers = words.tolist()
+    return [
+        (i, begin)
+        for i, (begin, end, storage_end) in enumerate(zip(numbers, numbers[1:], numbers[2:], strict=False))
+        if begin and begin % WORD == 0 and end - begin == length * WORD and end <= storage_end <= end + 64 * WORD
+    ]
+
+
+def _reals(address: int, count: int) -> list[float]:
+    numbers: list[float] = words_at(address, count).view(np.float64).tolist()
+    return numbers
 
 
 @cfunc(types.float64(types.int64, types.int64, types.int64), cache=True)

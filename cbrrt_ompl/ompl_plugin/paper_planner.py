@@ -31,18 +31,19 @@ class PaperPlanner(OwnSampler, oc.RRT):  # type: ignore[misc]  # OMPL has no typ
     goal is planned for with the tree that is there.
     """
 
-    def __init__(self, si: Any, scenario: Scenario, name: str) -> None:
+    def __init__(self, si: Any, scenario: Scenario, name: str, compiled: bool | None = None) -> None:
         """Name the planner and choose its sampler.
 
         Args:
             si: the space information, with our propagator or a user's own.
             scenario: robot, world and settings.
             name: a planner with a directed sampler of ours.
+            compiled: whether OMPL calls compiled code, see :mod:`cbrrt_ompl.ompl_plugin.compiled_methods`.
         """
         super().__init__(si)
         self.setName(name)
         self.setGoalBias(scenario.planning.goal_bias)
-        self._scenario = scenario
+        self._scenario, self._compiled = scenario, compiled
         self._query: Query | None = None
         self._goal: Any = None
 
@@ -77,7 +78,7 @@ class PaperPlanner(OwnSampler, oc.RRT):  # type: ignore[misc]  # OMPL has no typ
         """Make the sampler of a tree."""
         scenario = self._scenario
         sampler = SAMPLERS[planner_named(self.getName()).steering](
-            si, scenario.robot, scenario.world, scenario.planning
+            si, scenario.robot, scenario.world, scenario.planning, compiled=self._compiled
         )
         sampler.aim_at(self._goal)
         return sampler

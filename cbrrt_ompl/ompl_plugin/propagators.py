@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from cbrrt_ompl.motion.model import CLOSED_LOOP, OPEN_LOOP, STEERING, advance, make_model
 from cbrrt_ompl.motion.records import Records
 from cbrrt_ompl.ompl_plugin.binding import oc
+from cbrrt_ompl.ompl_plugin.compiled_methods import use_compiled_methods
+from cbrrt_ompl.ompl_plugin.native_methods import make_propagator_native
 from cbrrt_ompl.ompl_plugin.reals import StateReals
 from cbrrt_ompl.ompl_plugin.space import STATE_DIMENSION, check_space
 from cbrrt_ompl.problem.robot import Robot
@@ -41,6 +43,7 @@ class TwoWheelPropagator(oc.StatePropagator):  # type: ignore[misc]  # OMPL has 
         *,
         kinematic: bool = False,
         goal: Goal | None = None,
+        compiled: bool | None = None,
     ) -> None:
         """Drive a robot.
 
@@ -50,6 +53,7 @@ class TwoWheelPropagator(oc.StatePropagator):  # type: ignore[misc]  # OMPL has 
             planning: whether the loop is closed; None takes the defaults.
             kinematic: whether the velocities jump, as for S-RRT.
             goal: where final approaches lead to; None where there are none.
+            compiled: whether OMPL calls compiled code, see :mod:`cbrrt_ompl.ompl_plugin.compiled_methods`.
         """
         super().__init__(si)
         planning = planning or PlanningSettings()
@@ -58,7 +62,10 @@ class TwoWheelPropagator(oc.StatePropagator):  # type: ignore[misc]  # OMPL has 
         self.robot, self.goal = robot, goal
         self.model = make_model(law, robot, goal or NOWHERE, planning)
         self._reals = StateReals(si.getStateSpace(), STATE_DIMENSION)
-        self._has_third = si.getControlSpace().getDimension() == 3
+        dimension = si.getControlSpace().getDimension()
+        self._has_third = dimension == 3
+        if self.drives_by_model and use_compiled_methods(compiled):
+            make_propagator_native(self, self.model, dimension)
 
     def propagate(self, state: Any, control: Any, duration: float, result: Any) -> None:
         """Write the state that ``control`` leads to after ``duration`` [s]."""

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 from cbrrt_ompl.ompl_plugin.binding import ob, ou
+from cbrrt_ompl.ompl_plugin.compiled_methods import use_compiled_methods
 from cbrrt_ompl.ompl_plugin.paper_planner import PaperPlanner
 from cbrrt_ompl.ompl_plugin.results import trajectory_from_path, tree_from_planner
 from cbrrt_ompl.ompl_plugin.setup import Equipment, make_equipped_setup
@@ -56,6 +57,7 @@ def run(
         on_equipped: takes what the planner was given.
         prepare: takes the ``SimpleSetup`` before it is set up, to change it.
     """
+    use_compiled_methods()  # their check compiles, and no seed may depend on it
     with _ompl, quiet_ompl():
         # OMPL complains about a second seed in a process; yet all that is random below is allocated from here on
         ou.RNG.setSeed(1 + (secrets.randbits(31) if seed is None else int(seed)))

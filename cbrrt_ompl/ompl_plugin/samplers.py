@@ -5,9 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from cbrrt_ompl.collision.world import World
+from cbrrt_ompl.motion.records import record_array
 from cbrrt_ompl.ompl_plugin.binding import oc
 from cbrrt_ompl.ompl_plugin.children import Children
+from cbrrt_ompl.ompl_plugin.compiled_methods import use_compiled_methods
 from cbrrt_ompl.ompl_plugin.extender import Extender
+from cbrrt_ompl.ompl_plugin.native_methods import SAMPLER_RECORD, enter_scene, make_sampler_native
 from cbrrt_ompl.ompl_plugin.reals import StateReals
 from cbrrt_ompl.ompl_plugin.space import STATE_DIMENSION
 from cbrrt_ompl.planners.extension import EXTENDED, REFUSED
@@ -32,8 +35,6 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
 
     Attributes:
         extender: does the work.
-        samples: calls so far.
-        refused: calls refused by line 5 of Algorithm II.
     """
 
     kinematic = False
@@ -47,6 +48,7 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         planning: PlanningSettings | None = None,
         *,
         goal: Goal | None = None,
+        compiled: bool | None = None,
     ) -> None:
         """Make the buffers.
 
@@ -56,14 +58,18 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
             world: obstacles and walls.
             planning: settings of the extension; None takes the defaults. Step and horizon are those of ``si``.
             goal: region that ends an extension, and that final approaches lead to; None where it is not known.
+            compiled: whether OMPL calls compiled code, see :mod:`cbrrt_ompl.ompl_plugin.compiled_methods`.
         """
         super().__init__(si)
-        self.samples = self.refused = 0
+        self._record = record_array(1, SAMPLER_RECORD)
         self.extender = Extender(si, robot, world, planning, kinematic=self.kinematic, goal=goal)
         space = si.getStateSpace()
         self._node, self._sample = StateReals(space, STATE_DIMENSION), StateReals(space, STATE_DIMENSION)
         self._control_dimension = si.getControlSpace().getDimension()
         self._children = Children()
+        self._tell_record()
+        if type(self).sampleTo is _SAMPLE_TO and use_compiled_methods(compiled):
+            make_sampler_native(self, self._record)
 
     def aim_at(self, goal: Any) -> None:
         """Plan for a goal of OMPL's: it ends the extensions from now on.
@@ -72,6 +78,17 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
             goal: any goal of a problem definition.
         """
         self.extender.aim_at(goal)
+        self._tell_record()
+
+    @property
+    def samples(self) -> int:
+        """Calls so far."""
+        return int(self._record["samples"][0])
+
+    @property
+    def refused(self) -> int:
+        """Calls refused by line 5 of Algorithm II."""
+        return int(self._record["refused"][0])
 
     @property
     def children(self) -> int:
@@ -82,18 +99,20 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         """Extend ``states[-2]`` towards ``states[-1]``; OMPL may pass the node's control before them."""
         source, dest = states[-2:]
         extender, children = self.extender, self._children
-        self.samples += 1
+        self._record["samples"] += 1
         if self.samples % LOOK_PERIOD == 0:
             extender.look_again()
+            self._tell_record()
         self._node.read(source)
         self._sample.read(dest)
-        children.make_room()
+        if children.make_room():
+            self._tell_record()
         slot = children.slot(self._node.values)
         x, y = self._sample.values[0], self._sample.values[1]
         outcome = extender.extend(source, self._node.values, x, y, children.first_child(slot), children.records)
         children.note_trial(slot)
         if outcome != EXTENDED:
-            self.refused += outcome == REFUSED
+            self._record["refused"] += outcome == REFUSED
             return 0
         children.add(slot, *extender.command)
         for i in range(self._control_dimension):
@@ -101,6 +120,19 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         self._sample.values[:] = extender.end
         self._sample.write(dest)
         return extender.steps
+
+    def _tell_record(self) -> None:
+        """Tell the compiled method where everything is, and whether it may decide."""
+        record, extender, children = self._record, self.extender, self._children
+        enter_scene(record, extender.scene)
+        record["model"], record["block"] = extender.model.ctypes.data, extender.block.ctypes.data
+        record["parents"], record["children"] = children.parents.ctypes.data, children.records.ctypes.data
+        record["counts"], record["capacity"] = children.counts.ctypes.data, len(children.records)
+        record["slots"], record["dimension"] = len(children.parents), self._control_dimension
+        record["is_compiled"], record["look_period"] = extender.is_compiled, LOOK_PERIOD
+
+
+_SAMPLE_TO = ExtensionSampler.sampleTo
 
 
 class KanayamaDirectedControlSampler(ExtensionSampler):

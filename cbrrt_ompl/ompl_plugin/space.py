@@ -9,6 +9,8 @@ from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import Problem, SettingsError
 from cbrrt_ompl.motion.kinematics import wrap_angle
 from cbrrt_ompl.ompl_plugin.binding import ob, oc
+from cbrrt_ompl.ompl_plugin.compiled_methods import use_compiled_methods
+from cbrrt_ompl.ompl_plugin.native_space import make_native, make_space_native
 from cbrrt_ompl.problem.obstacles import Bounds
 from cbrrt_ompl.problem.robot import Limits, Robot
 from cbrrt_ompl.problem.settings import State
@@ -21,7 +23,7 @@ BOUNDS_SLACK = 1e-9
 """What a state may exceed its bounds by, for the rounding of an integration step [m, m/s, rad/s]."""
 
 
-def make_state_space(bounds: Bounds | World, limits: Limits | Robot) -> Any:
+def make_state_space(bounds: Bounds | World, limits: Limits | Robot, compiled: bool | None = None) -> Any:
     """A flat compound [R^2 (x, y), SO(2), R^2 (v, omega)] with weights 1, 0, 0 and the projection to (x, y).
 
     The weights make OMPL's nearest neighbour the paper's, which looks at positions alone. The components are those of
@@ -30,6 +32,7 @@ def make_state_space(bounds: Bounds | World, limits: Limits | Robot) -> Any:
     Args:
         bounds: range of (x, y), or the world that has it.
         limits: ranges of v and omega, or the robot that has them.
+        compiled: whether OMPL's calls of it are led past Python, see :mod:`cbrrt_ompl.ompl_plugin.compiled_methods`.
 
     Returns:
         An ``ompl.base.CompoundStateSpace``, locked, not set up yet.
@@ -45,13 +48,23 @@ def make_state_space(bounds: Bounds | World, limits: Limits | Robot) -> Any:
     space.addSubspace(poses.getSubspace(1), 0.0)
     space.addSubspace(twists.getSubspace(0), 0.0)
     space.lock()
-    space.registerDefaultProjection(
-        ob.SubspaceProjectionEvaluator(space, 0)
-    )  # before the set-up: afterwards OMPL would crash on it
+    space.computeLocations()  # which copies of reals need before any set-up
+    is_compiled = use_compiled_methods(compiled)
+    if is_compiled:
+        make_space_native(space)
+    register_projection(space, is_compiled)  # before the set-up: afterwards OMPL would crash on it
     return space
 
 
-def make_control_space(space: Any, limits: Limits | Robot, has_manoeuvres: bool = False) -> Any:
+def register_projection(space: Any, compiled: bool | None = None) -> None:
+    """Make the projection to (x, y) the default one of a space of ours."""
+    projection = ob.SubspaceProjectionEvaluator(space, 0)
+    space.registerDefaultProjection(make_native(projection) if use_compiled_methods(compiled) else projection)
+
+
+def make_control_space(
+    space: Any, limits: Limits | Robot, has_manoeuvres: bool = False, compiled: bool | None = None
+) -> Any:
     """Velocity commands (v, omega) in R^2, within the velocity ranges.
 
     Args:
@@ -59,22 +72,26 @@ def make_control_space(space: Any, limits: Limits | Robot, has_manoeuvres: bool 
         limits: ranges of v and omega, or the robot that has them.
         has_manoeuvres: whether a third number, from 0 to 1 and without meaning, makes room for the marks of
             :mod:`cbrrt_ompl.motion.manoeuvres`, which are outside of that range.
+        compiled: see :func:`make_state_space`.
     """
     limits = limits.limits if isinstance(limits, Robot) else limits
     low: tuple[float, ...] = (limits.v_min, limits.omega_min)
     high: tuple[float, ...] = (limits.v_max, limits.omega_max)
     if has_manoeuvres:
         low, high = (*low, 0.0), (*high, 1.0)
+    return _real_vector_controls(space, low, high, compiled)
+
+
+def make_reference_space(space: Any, bounds: Bounds, compiled: bool | None = None) -> Any:
+    """References (x_r, y_r, theta_r) in R^3: the control of the closed loop."""
+    low, high = (*bounds.min, -3.141592653589793), (*bounds.max, 3.141592653589793)
+    return _real_vector_controls(space, low, high, compiled)
+
+
+def _real_vector_controls(space: Any, low: tuple[float, ...], high: tuple[float, ...], compiled: bool | None) -> Any:
     controls = oc.RealVectorControlSpace(space, len(low))
     controls.setBounds(_bounds(low, high))
-    return controls
-
-
-def make_reference_space(space: Any, bounds: Bounds) -> Any:
-    """References (x_r, y_r, theta_r) in R^3: the control of the closed loop."""
-    controls = oc.RealVectorControlSpace(space, 3)
-    controls.setBounds(_bounds((*bounds.min, -3.141592653589793), (*bounds.max, 3.141592653589793)))
-    return controls
+    return make_native(controls) if use_compiled_methods(compiled) else controls
 
 
 def read_state(state: Any) -> State:

@@ -6,7 +6,10 @@ import math
 from typing import Any
 
 from cbrrt_ompl.collision.world import World
+from cbrrt_ompl.motion.records import record_array
 from cbrrt_ompl.ompl_plugin.binding import ob
+from cbrrt_ompl.ompl_plugin.compiled_methods import use_compiled_methods
+from cbrrt_ompl.ompl_plugin.native_methods import CHECKER_RECORD, make_checker_native
 from cbrrt_ompl.ompl_plugin.reals import StateReals
 from cbrrt_ompl.ompl_plugin.space import STATE_DIMENSION, check_space, is_within_bounds
 from cbrrt_ompl.problem.robot import Robot
@@ -18,12 +21,11 @@ class FclStateValidityChecker(ob.StateValidityChecker):  # type: ignore[misc]  #
     Contract with OMPL: the state is only read. A state with a number that is not finite is invalid.
 
     Attributes:
-        checked: states judged so far.
         robot: whose footprint is posed.
         world: obstacles and walls.
     """
 
-    def __init__(self, si: Any, robot: Robot, world: World) -> None:
+    def __init__(self, si: Any, robot: Robot, world: World, *, compiled: bool | None = None) -> None:
         """Judge for a robot in a world.
 
         Args:
@@ -31,17 +33,25 @@ class FclStateValidityChecker(ob.StateValidityChecker):  # type: ignore[misc]  #
                 :func:`cbrrt_ompl.ompl_plugin.space.make_state_space`.
             robot: its footprint.
             world: obstacles and walls.
+            compiled: whether OMPL calls compiled code, see :mod:`cbrrt_ompl.ompl_plugin.compiled_methods`.
         """
         super().__init__(si)
         check_space(si.getStateSpace())
-        self.checked = 0
+        self._record = record_array(1, CHECKER_RECORD)
         self.robot, self.world = robot, world
         self._space = si.getStateSpace()
         self._reals = StateReals(self._space, STATE_DIMENSION)
+        if type(self).isValid is _IS_VALID and use_compiled_methods(compiled):
+            make_checker_native(self, world.scene(robot.footprint), self._space, self._record)
+
+    @property
+    def checked(self) -> int:
+        """States judged so far."""
+        return int(self._record["checked"][0])
 
     def isValid(self, state: Any) -> bool:  # noqa: N802  # OMPL's name
         """Whether the state is within the bounds, and the footprint free at it."""
-        self.checked += 1
+        self._record["checked"] += 1
         self._reals.read(state)
         x, y, theta, v, omega = self._reals.values.tolist()
         if not math.isfinite(x + y + theta + v + omega):

@@ -88,6 +88,20 @@ def _redirect(python_object: Any, class_name: str, wrapper: str, vtable: int) ->
     first[0] = vtable
 
 
+def virtual_method(python_object: Any, class_name: str, wrapper: str, method: str) -> int:
+    """Address of what C++ calls when it calls a method of an object.
+
+    Args:
+        python_object: an object made in Python.
+        class_name: its C++ class.
+        wrapper: the class that Boost.Python derives from it.
+        method: symbol of the wrapper's method.
+    """
+    slot = slot_of(vtable_words(wrapper), symbol_address(method)) - BEFORE_SLOTS
+    vtable = int(words_at(object_address(python_object, class_name), 1)[0])
+    return int(words_at(vtable, slot + 1)[slot])
+
+
 @njit(cache=True, forceinline=True)
 def record_address(this: int) -> int:
     """Address of an object's record, for the compiled functions of :func:`call_compiled`."""
