@@ -45,7 +45,7 @@ def _exit_without_destructors() -> None:
     import ctypes
 
     libc = ctypes.CDLL(None)
-    if not _BOTH_COPIES and _has_two_copies():
+    if not _BOTH_COPIES and has_two_copies():
         _BOTH_COPIES.append(libc)
         libc.on_exit(libc._exit, None)
         atexit.register(libc.fflush, None)
@@ -55,7 +55,7 @@ _BOTH_COPIES: list[Any] = []
 """The C library, once its ``on_exit`` has been told what to do."""
 
 
-def _has_two_copies() -> bool:
+def has_two_copies() -> bool:
     """Whether two files called libompl are mapped into this process."""
     try:
         with open("/proc/self/maps", encoding="utf-8", errors="replace") as maps:

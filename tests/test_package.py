@@ -69,7 +69,12 @@ assert {module}.__name__ == "ompl.{module}"
 print("made a set-up")
 sys.exit(5)"""
     done = run_python(code)
-    assert (done.returncode, done.stdout, done.stderr) == (5, "made a set-up\n", "")
+    assert (done.returncode, done.stdout) == (5, "made a set-up\n")
+    if first:
+        assert done.stderr == ""
+    else:
+        assert done.stderr.count("\n") == 1
+        assert "import cbrrt_ompl before OMPL's modules" in done.stderr
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the wheel is loaded as it is")

@@ -47,6 +47,7 @@ from cbrrt_ompl.ompl_plugin.space import bounds_of, make_control_space, make_sta
 from cbrrt_ompl.ompl_plugin.space import read_state as state_of
 from cbrrt_ompl.ompl_plugin.validity import FclStateValidityChecker
 from cbrrt_ompl.ompl_plugin.virtual_calls import virtual_method
+from cbrrt_ompl.one_libompl import has_two_copies
 from cbrrt_ompl.problem.obstacles import Bounds, Box
 from cbrrt_ompl.problem.robot import Footprint, Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
@@ -69,6 +70,8 @@ def check_compiled_methods() -> None:
     """Raise an exception if something is not as the compiled methods need it."""
     if version("ompl") != WHEEL:
         raise LayoutError(f"they are made for ompl {WHEEL}, and this is {version('ompl')}")
+    if has_two_copies():
+        raise LayoutError("two copies of libompl are loaded; import cbrrt_ompl before OMPL's modules")
     check_vtables()
     check_reading()
     check_results()
