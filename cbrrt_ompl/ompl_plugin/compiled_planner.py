@@ -119,8 +119,8 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
             scenario.world,
             scenario.planning,
             kinematic=planner_named(self.getName()).law(scenario.planning) == STEERING,
+            ompl_goal=self._goal[0],
         )
-        extender.aim_at(self._goal[0])
         settings: dict[str, Any] = {
             "seed": self._seed,
             "goal_bias": scenario.planning.goal_bias,

@@ -63,6 +63,7 @@ class Extender:
         *,
         kinematic: bool = False,
         goal: Goal | None = None,
+        ompl_goal: Any = None,
     ) -> None:
         """Look at the space information.
 
@@ -73,13 +74,14 @@ class Extender:
             planning: settings of the extension; None takes the defaults. Step and horizon are those of ``si``.
             kinematic: whether the velocities jump.
             goal: region that ends an extension, and that final approaches lead to; None where it is not known.
+            ompl_goal: goal of a problem definition, in the place of ``goal``.
         """
         check_space(si.getStateSpace())
         self.end = np.empty(5)
         self.steps, self.command, self.control = 0, (0.0, 0.0), (0.0, 0.0, 0.0)
         self._si, self._kinematic = si, kinematic
         self._robot, self._world, self._planning = robot, world, planning or PlanningSettings()
-        self._goal, self._ompl_goal = goal, None
+        self._goal, self._ompl_goal = goal, ompl_goal
         self.scene = world.scene(robot.footprint)
         self.model = record_array(1, MODEL)
         self._control_dimension = si.getControlSpace().getDimension()
@@ -113,9 +115,12 @@ class Extender:
         region = self._goal if self._ompl_goal is None else region_of(self._ompl_goal, space)
         model = self.model
         model[:] = make_model(law, self._robot, region or NOWHERE, planning)
-        if si.getPropagationStepSize() > 0.0:  # it is 0 until the space information is set up
-            check_step(self._robot, replace(planning, step=si.getPropagationStepSize(), horizon=_any_horizon(si)))
-            model["dt"] = si.getPropagationStepSize()
+        step = si.getPropagationStepSize()
+        if step > 0.0:  # it is 0 until the space information is set up
+            if step != planning.step:
+                planning = replace(planning, step=step, horizon=step)
+            check_step(self._robot, planning)
+            model["dt"] = step
         if si.getMaxControlDuration() > 0:
             model["steps"] = si.getMaxControlDuration()
         propagator = si.getStatePropagator()
@@ -197,11 +202,6 @@ class Extender:
         if found.outcome == EXTENDED:
             self.end[:] = read_state(asked.end)
         return found.outcome
-
-
-def _any_horizon(si: Any) -> float:
-    """A horizon that goes with any step."""
-    return float(si.getPropagationStepSize())
 
 
 @njit(cache=True)

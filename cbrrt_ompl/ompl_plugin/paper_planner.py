@@ -77,11 +77,14 @@ class PaperPlanner(OwnSampler, oc.RRT):  # type: ignore[misc]  # OMPL has no typ
     def allocate(self, si: Any) -> ExtensionSampler:
         """Make the sampler of a tree."""
         scenario = self._scenario
-        sampler = SAMPLERS[planner_named(self.getName()).steering](
-            si, scenario.robot, scenario.world, scenario.planning, compiled=self._compiled
+        return SAMPLERS[planner_named(self.getName()).steering](
+            si,
+            scenario.robot,
+            scenario.world,
+            scenario.planning,
+            ompl_goal=self._goal,
+            compiled=self._compiled,
         )
-        sampler.aim_at(self._goal)
-        return sampler
 
     @property
     def samples(self) -> int:

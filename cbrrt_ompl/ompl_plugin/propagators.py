@@ -97,7 +97,8 @@ def drives_like(propagator: Any, model: Records) -> bool:
     """Whether a space information's propagator is ours and moves the robot as a model does, but for its step."""
     if not (isinstance(propagator, TwoWheelPropagator) and propagator.drives_by_model):
         return False
-    return all(propagator.model[name][0] == model[name][0] for name in ("law", "limits", "gains"))
+    own, other = propagator.model[0], model[0]
+    return all(own[name].tobytes() == other[name].tobytes() for name in ("law", "limits", "gains"))
 
 
 @njit(cache=True)

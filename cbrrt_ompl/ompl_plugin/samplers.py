@@ -17,8 +17,9 @@ from cbrrt_ompl.planners.extension import EXTENDED, REFUSED
 from cbrrt_ompl.problem.robot import Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings
 
-LOOK_PERIOD = 256
-"""Extensions after which a sampler looks again whether the parts of its space information are still the same."""
+LOOK_PERIOD = 4096
+"""Extensions after which a sampler looks again whether the parts of its space information are still the same; that one
+goes through Python, which lets a Ctrl-C through."""
 
 
 class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL has no type information
@@ -48,6 +49,7 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         planning: PlanningSettings | None = None,
         *,
         goal: Goal | None = None,
+        ompl_goal: Any = None,
         compiled: bool | None = None,
     ) -> None:
         """Make the buffers.
@@ -58,11 +60,12 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
             world: obstacles and walls.
             planning: settings of the extension; None takes the defaults. Step and horizon are those of ``si``.
             goal: region that ends an extension, and that final approaches lead to; None where it is not known.
+            ompl_goal: goal of a problem definition, in the place of ``goal``, see :meth:`aim_at`.
             compiled: whether OMPL calls compiled code, see :mod:`cbrrt_ompl.ompl_plugin.compiled_methods`.
         """
         super().__init__(si)
         self._record = record_array(1, SAMPLER_RECORD)
-        self.extender = Extender(si, robot, world, planning, kinematic=self.kinematic, goal=goal)
+        self.extender = Extender(si, robot, world, planning, kinematic=self.kinematic, goal=goal, ompl_goal=ompl_goal)
         space = si.getStateSpace()
         self._node, self._sample = StateReals(space, STATE_DIMENSION), StateReals(space, STATE_DIMENSION)
         self._control_dimension = si.getControlSpace().getDimension()

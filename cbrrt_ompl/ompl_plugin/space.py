@@ -146,8 +146,12 @@ def check_space(space: Any) -> None:
 
 def bounds_of(space: Any) -> tuple[float, ...]:
     """Bounds of a space of ours: lows and highs of (x, y), then lows and highs of (v, omega)."""
-    found = (space.getSubspace(component).getBounds() for component in (0, 2))
-    return tuple(number for bounds in found for number in (*bounds.low, *bounds.high))
+    numbers: list[float] = []
+    for component in (0, 2):
+        bounds = space.getSubspace(component).getBounds()
+        for vector in (bounds.low, bounds.high):
+            numbers += (vector[0], vector[1])
+    return tuple(numbers)
 
 
 def covers(space: Any, bounds: Bounds | None, limits: Limits) -> bool:
