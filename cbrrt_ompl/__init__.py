@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from cbrrt_ompl.collision.world import World
     from cbrrt_ompl.errors import CbrrtError, InputError
     from cbrrt_ompl.maps import OccupancyMap, load_dynobench, load_map, save_map
+    from cbrrt_ompl.motion.laws import register_law
     from cbrrt_ompl.ompl_plugin.own_sampler import with_directed_sampler
     from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
     from cbrrt_ompl.ompl_plugin.results import trajectory_from_path
@@ -70,6 +71,7 @@ __all__ = [
     "make_state_space",
     "plan",
     "read_state",
+    "register_law",
     "save_map",
     "save_scenario",
     "trajectory_from_path",
@@ -81,6 +83,7 @@ __all__ = [
 _MODULES = {
     "collision.world": ("World",),
     "errors": ("CbrrtError", "InputError"),
+    "motion.laws": ("register_law",),
     "ompl_plugin.own_sampler": ("with_directed_sampler",),
     "ompl_plugin.propagators": ("TwoWheelPropagator",),
     "ompl_plugin.results": ("trajectory_from_path",),

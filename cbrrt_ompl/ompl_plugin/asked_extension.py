@@ -12,6 +12,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from cbrrt_ompl.motion.control_laws import reference_pose
+from cbrrt_ompl.motion.laws import raise_errors
 from cbrrt_ompl.motion.manoeuvres import FORWARD, REVERSE, most_steps
 from cbrrt_ompl.motion.model import CANDIDATES, STEERING, candidate, manoeuvre_has_ended
 from cbrrt_ompl.motion.records import Record
@@ -114,6 +115,7 @@ class OmplSteps:
         nearest = math.inf
         for choice in range(CANDIDATES if model["law"] == STEERING else 1):
             v, omega, numbers = candidate(choice, (*node,), reference, model)
+            raise_errors()
             if is_refused(v, omega):
                 continue
             steps, is_free, in_goal = self._drive(source, numbers, control)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from cbrrt_ompl.collision.scene import Scene
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import Problem, SettingsError
+from cbrrt_ompl.motion.laws import is_compiled_law, raise_errors
 from cbrrt_ompl.motion.model import CLOSED_LOOP, MODEL, OPEN_LOOP, STEERING, check_step, make_model
 from cbrrt_ompl.motion.records import Records, record_array
 from cbrrt_ompl.ompl_plugin.asked_extension import OmplSteps
@@ -94,6 +95,11 @@ class Extender:
         """Whether compiled kernels decide everything."""
         return self._asked is None and self._goal_finder is None
 
+    @property
+    def has_compiled_law(self) -> bool:
+        """Whether the control law is compiled, so that nothing in an extension can raise an exception."""
+        return is_compiled_law(self._planning.law)
+
     def aim_at(self, goal: Any) -> None:
         """Plan for a goal of OMPL's: it ends the extensions from now on.
 
@@ -171,6 +177,7 @@ class Extender:
         outcome: int = extend_values(
             node, self.end, first_child, children, *self.scene, self.model, self.block, self._extension
         )
+        raise_errors()
         steps, v, omega, control = self._extension[0]
         self.steps, self.command, self.control = int(steps), (v, omega), tuple(control.tolist())
         if outcome == EXTENDED and self._goal_finder is not None:

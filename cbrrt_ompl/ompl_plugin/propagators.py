@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cbrrt_ompl.motion.laws import is_compiled_law, raise_errors
 from cbrrt_ompl.motion.model import CLOSED_LOOP, OPEN_LOOP, STEERING, advance, make_model
 from cbrrt_ompl.motion.records import Records
 from cbrrt_ompl.ompl_plugin.binding import oc
@@ -64,7 +65,8 @@ class TwoWheelPropagator(oc.StatePropagator):  # type: ignore[misc]  # OMPL has 
         self._reals = StateReals(si.getStateSpace(), STATE_DIMENSION)
         dimension = si.getControlSpace().getDimension()
         self._has_third = dimension == 3
-        if self.drives_by_model and use_compiled_methods(compiled):
+        may_raise = law == CLOSED_LOOP and not is_compiled_law(planning.law)
+        if self.drives_by_model and not may_raise and use_compiled_methods(compiled):
             make_propagator_native(self, self.model, dimension)
 
     def propagate(self, state: Any, control: Any, duration: float, result: Any) -> None:
@@ -74,6 +76,7 @@ class TwoWheelPropagator(oc.StatePropagator):  # type: ignore[misc]  # OMPL has 
         self._reals.read(state)
         third = control[2] if self._has_third else 0.0
         advance_values(self._reals.values, control[0], control[1], third, self.model, duration)
+        raise_errors()
         self._reals.write(result)
 
     @property
@@ -98,7 +101,9 @@ def drives_like(propagator: Any, model: Records) -> bool:
     if not (isinstance(propagator, TwoWheelPropagator) and propagator.drives_by_model):
         return False
     own, other = propagator.model[0], model[0]
-    return all(own[name].tobytes() == other[name].tobytes() for name in ("law", "limits", "gains"))
+    return all(own[name].tobytes() == other[name].tobytes() for name in ("law", "limits", "gains")) and (
+        own["law"] != CLOSED_LOOP or own["law_address"] == other["law_address"]
+    )
 
 
 @njit(cache=True)

@@ -132,7 +132,8 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         record["parents"], record["children"] = children.parents.ctypes.data, children.records.ctypes.data
         record["counts"], record["capacity"] = children.counts.ctypes.data, len(children.records)
         record["slots"], record["dimension"] = len(children.parents), self._control_dimension
-        record["is_compiled"], record["look_period"] = extender.is_compiled, LOOK_PERIOD
+        record["is_compiled"] = extender.is_compiled and extender.has_compiled_law
+        record["look_period"] = LOOK_PERIOD
 
 
 _SAMPLE_TO = ExtensionSampler.sampleTo
