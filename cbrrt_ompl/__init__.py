@@ -8,11 +8,20 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from cbrrt_ompl.one_libompl import load_one_libompl
+
 if TYPE_CHECKING:
     from cbrrt_ompl.collision.world import World
     from cbrrt_ompl.errors import CbrrtError, InputError, OmplMissingError
     from cbrrt_ompl.maps import OccupancyMap, load_dynobench, load_map, save_map
+    from cbrrt_ompl.motion.laws import register_law
+    from cbrrt_ompl.ompl_plugin.own_sampler import with_directed_sampler
+    from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
+    from cbrrt_ompl.ompl_plugin.results import trajectory_from_path
+    from cbrrt_ompl.ompl_plugin.samplers import KanayamaDirectedControlSampler, SteeringDirectedControlSampler
     from cbrrt_ompl.ompl_plugin.setup import make_setup
+    from cbrrt_ompl.ompl_plugin.space import make_control_space, make_state_space, read_state, write_state
+    from cbrrt_ompl.ompl_plugin.validity import FclStateValidityChecker
     from cbrrt_ompl.planning import PlanResult, plan
     from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, OrientedBox, Polygon
     from cbrrt_ompl.problem.ready_robots import ROBOTS
@@ -29,10 +38,12 @@ __all__ = [
     "Box",
     "CbrrtError",
     "Disc",
+    "FclStateValidityChecker",
     "Footprint",
     "Gains",
     "Goal",
     "InputError",
+    "KanayamaDirectedControlSampler",
     "Limits",
     "OccupancyMap",
     "OmplMissingError",
@@ -44,23 +55,39 @@ __all__ = [
     "Robot",
     "Scenario",
     "State",
+    "SteeringDirectedControlSampler",
     "Trajectory",
+    "TwoWheelPropagator",
     "World",
     "__version__",
     "load_dynobench",
     "load_map",
     "load_scenario",
+    "make_control_space",
     "make_setup",
+    "make_state_space",
     "plan",
+    "read_state",
+    "register_law",
     "save_map",
     "save_scenario",
+    "trajectory_from_path",
     "verify",
+    "with_directed_sampler",
+    "write_state",
 ]
 
 _MODULES = {
     "collision.world": ("World",),
     "errors": ("CbrrtError", "InputError", "OmplMissingError"),
+    "motion.laws": ("register_law",),
+    "ompl_plugin.own_sampler": ("with_directed_sampler",),
+    "ompl_plugin.propagators": ("TwoWheelPropagator",),
+    "ompl_plugin.results": ("trajectory_from_path",),
+    "ompl_plugin.samplers": ("KanayamaDirectedControlSampler", "SteeringDirectedControlSampler"),
     "ompl_plugin.setup": ("make_setup",),
+    "ompl_plugin.space": ("make_control_space", "make_state_space", "read_state", "write_state"),
+    "ompl_plugin.validity": ("FclStateValidityChecker",),
     "planning": ("PlanResult", "plan"),
     "problem.obstacles": ("Bounds", "Box", "Disc", "OrientedBox", "Polygon"),
     "problem.ready_robots": ("ROBOTS",),
@@ -72,6 +99,8 @@ _MODULES = {
     "verification": ("verify",),
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names}
+
+load_one_libompl()
 
 
 def __getattr__(name: str) -> Any:

@@ -301,7 +301,7 @@ def test_no_planner_runs_with_the_sampler_or_the_model_of_another(
         return sample(self, *arguments)
 
     def noting_propagate(self: Any, *arguments: Any) -> None:
-        laws[experiment._active.getName()].add(int(self._model[0]))
+        laws[experiment._active.getName()].add(int(self.model[0]))
         propagate(self, *arguments)
 
     monkeypatch.setattr(ExtensionSampler, "sampleTo", counting_sample)

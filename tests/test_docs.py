@@ -161,6 +161,20 @@ def test_the_python_on_the_pages_runs(repository: Path, docs: Path, tmp_path: Pa
     ] in done.stdout
 
 
+def test_the_set_up_and_the_law_on_the_page_on_ompl_run(repository: Path, docs: Path, tmp_path: Path) -> None:
+    whole = [
+        block
+        for block in blocks((docs / "ompl.md").read_text(encoding="utf-8"), "python")
+        if "verify(" in block or "register_law(" in block
+    ]
+    environment = {**os.environ, "PYTHONPATH": str(repository)}
+    for code, expected in zip(whole, ("True", "solved"), strict=True):
+        done = subprocess.run(
+            [sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120
+        )
+        assert (done.returncode, done.stdout.strip()) == (0, expected), done.stderr
+
+
 def test_the_citation_has_the_version_of_the_project(repository: Path) -> None:
     with (repository / "pyproject.toml").open("rb") as file:
         project = tomllib.load(file)["project"]

@@ -16,17 +16,16 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from kernels import model_of, record_of
 from numpy.typing import NDArray
 
 from cbrrt_ompl import load_scenario, make_setup, plan
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import UnknownPlannerError
-from cbrrt_ompl.motion.model import in_goal
+from cbrrt_ompl.motion.model import OPEN_LOOP, in_goal, make_model
 from cbrrt_ompl.ompl_plugin.availability import has_ompl
 from cbrrt_ompl.planners.registry import PLANNERS, Backend
 from cbrrt_ompl.problem.obstacles import Bounds, Box
-from cbrrt_ompl.problem.robot import Limits
+from cbrrt_ompl.problem.robot import Limits, Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.scenario.scenario import Scenario
 
@@ -43,10 +42,9 @@ if has_ompl():
     )
     from cbrrt_ompl.ompl_plugin.setup import (
         equip,
-        make_equipped_setup,
         make_planner,
     )
-    from cbrrt_ompl.ompl_plugin.space import make_state_space, set_state
+    from cbrrt_ompl.ompl_plugin.space import make_state_space, write_state
     from cbrrt_ompl.ompl_plugin.validity import FclStateValidityChecker
 else:
     pytest.skip("all of it needs OMPL", allow_module_level=True)
@@ -60,9 +58,9 @@ EASY = Scenario(
 )
 """A wall to drive around: every planner solves it in a fraction of a second."""
 
+PAPER_PLANNERS = [name for name, planner in PLANNERS.items() if planner.backend is Backend.PLUGIN]
+OTHER_PLANNERS = [name for name, planner in PLANNERS.items() if planner.backend is not Backend.PLUGIN]
 ALL_PLANNERS = list(PLANNERS)
-PAPER_PLANNERS = [name for name, row in PLANNERS.items() if row.backend is Backend.PLUGIN]
-OTHER_PLANNERS = [name for name in PLANNERS if name not in PAPER_PLANNERS]
 
 
 @pytest.fixture(autouse=True)
@@ -91,7 +89,7 @@ def sampler_calls(monkeypatch: pytest.MonkeyPatch) -> Counter[type]:
 def ompl_state(space: Any, *values: float) -> Any:
     """A scoped state of (x, y, theta, v, omega)."""
     state = ob.State(space)
-    set_state(state(), State(*values))
+    write_state(state, State(*values))
     return state
 
 
@@ -172,11 +170,11 @@ def test_every_edge_of_the_tree_replays_to_the_stored_states(
 
 @pytest.mark.parametrize("planner", PAPER_PLANNERS)
 def test_a_trajectory_passes_through_the_states_of_its_path(planner: str) -> None:
-    setup, equipment = make_equipped_setup(EASY, planner)
+    setup = make_setup(EASY, planner)
     solve(setup, 5000)
     assert setup.haveExactSolutionPath()
     path, space = setup.getSolutionPath(), setup.getStateSpace()
-    trajectory = trajectory_from_path(path, space, equipment.model)
+    trajectory = trajectory_from_path(path, EASY)
     durations = [path.getControlDuration(i) for i in range(path.getControlCount())]
     rows = np.rint(np.cumsum([0.0, *durations]) / EASY.planning.step).astype(int)
     stored = np.array([reals(space, path.getState(i)) for i in range(path.getStateCount())])
@@ -300,7 +298,7 @@ def test_kernel_and_goal_state_agree_on_the_rim_of_the_goal(angle: float, ulps: 
         distance = math.nextafter(distance, math.copysign(math.inf, ulps))
     x, y = goal.x + distance * math.cos(angle), goal.y + distance * math.sin(angle)
     region = make_goal(SPACE_INFORMATION, SPACE, goal)
-    kernel = record_of(model_of(goal=goal)).goal
+    kernel = make_model(OPEN_LOOP, Robot(), goal, PlanningSettings())["goal"][0]
     state = ompl_state(SPACE, x, y, 0.3, 0.1, 0.1)
     assert in_goal(kernel, x, y, 0.3, 0.1, 0.1) == region.isSatisfied(state())
 
@@ -333,12 +331,12 @@ def test_heading_and_speed_at_the_goal_are_obeyed(planner: str) -> None:
 
 
 def allocated(scenario: Scenario, planner: str) -> tuple[Any, ExtensionSampler]:
-    """A set-up, to be kept, and a directed sampler that its space information allocates."""
-    setup, equipment = make_equipped_setup(scenario, planner)
-    setup.setup()
-    setup.getSpaceInformation().allocDirectedControlSampler()
-    assert equipment.sampler is not None
-    return setup, equipment.sampler
+    """A set-up, to be kept, and the directed sampler of its planner."""
+    setup = make_setup(scenario, planner)
+    solve(setup, 0)
+    sampler = setup.getPlanner().sampler
+    assert isinstance(sampler, ExtensionSampler)
+    return setup, sampler
 
 
 def extend(setup: Any, sampler: ExtensionSampler, node: tuple[float, ...], x: float, y: float) -> int:
@@ -431,7 +429,7 @@ def test_equipping_another_planner_takes_the_directed_sampler_away(planner: str,
     solve(setup, 10)
     assert sampler_calls.pop(KanayamaDirectedControlSampler) == 10
     si = setup.getSpaceInformation()
-    equip(si, setup.getStateSpace(), EASY, planner)
+    equip(si, EASY, planner)
     setup.setPlanner(make_planner(si, EASY, planner))
     solve(setup, 100)
     assert sampler_calls == {}
@@ -466,8 +464,7 @@ def test_an_exception_in_a_callback_reaches_the_caller(
 
 
 def resident_memory() -> int:
-    """Resident memory of this process, without what Python can free [bytes]."""
-    gc.collect()
+    """Resident memory of this process [bytes]."""
     with open("/proc/self/statm", encoding="ascii") as file:
         return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
@@ -483,9 +480,6 @@ def test_plans_leave_no_memory_behind(planner: str) -> None:
     for seed in range(30):
         plan(scenario, planner, seed=seed)
     assert resident_memory() - before < 1_000_000
-
-
-# the rest
 
 
 def test_the_random_numbers_of_python_are_left_alone() -> None:

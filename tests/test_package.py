@@ -72,6 +72,34 @@ sys.exit(7)"""
     assert done.returncode == 7, done.stderr
 
 
+@pytest.mark.parametrize("module", ["util", "base", "control", "geometric", "tools"])
+@pytest.mark.parametrize("first", ["import cbrrt_ompl", "import ompl\nimport cbrrt_ompl", ""])
+def test_ompl_may_be_imported_before_the_first_plan_and_before_the_package(first: str, module: str) -> None:
+    """OMPL's modules loaded a second libompl unless our binding came first, and the process died at its end."""
+    code = f"""{first}
+from ompl import {module}
+import sys, cbrrt_ompl
+setup = cbrrt_ompl.make_setup(cbrrt_ompl.load_scenario("paper_case1"), "rrt")
+assert {module}.__name__ == "ompl.{module}"
+print("made a set-up")
+sys.exit(5)"""
+    done = run_python(code)
+    assert (done.returncode, done.stdout) == (5, "made a set-up\n")
+    if first:
+        assert done.stderr == ""
+    else:
+        assert done.stderr.count("\n") == 1
+        assert "import cbrrt_ompl before OMPL's modules" in done.stderr
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the wheel is loaded as it is")
+def test_one_libompl_is_loaded_where_the_package_comes_first() -> None:
+    code = """import cbrrt_ompl
+from ompl import base
+print(len({line.split()[-1] for line in open("/proc/self/maps") if "/libompl" in line}))"""
+    assert run_python(code).stdout == "1\n"
+
+
 def test_importing_the_package_imports_nothing_heavy() -> None:
     done = run_python("import sys, json, cbrrt_ompl; print(json.dumps([m.split('.')[0] for m in sys.modules]))")
     assert done.returncode == 0, done.stderr

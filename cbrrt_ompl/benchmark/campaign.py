@@ -19,6 +19,7 @@ from cbrrt_ompl.benchmark.local import run_locally
 from cbrrt_ompl.benchmark.log import Log, format_log, merge_logs, read_log
 from cbrrt_ompl.errors import CbrrtError, InputError, Problem, SettingsError
 from cbrrt_ompl.files import write_file
+from cbrrt_ompl.motion.laws import law_origin
 from cbrrt_ompl.motion.model import check_step
 from cbrrt_ompl.ompl_plugin.availability import check_ompl
 from cbrrt_ompl.planners.registry import planner_named
@@ -85,11 +86,12 @@ class Campaign:
         cases = []
         for experiment, scenario in self.scenarios.items():
             data = scenario_to_dict(replace(scenario, map=None))  # all obstacles: a map's file may not be there
+            law = law_origin(scenario.planning.law)
             for planner in self.planners:
                 seeds = run_seeds(self.seed, experiment, planner, self.runs)
                 for first in range(0, self.runs, RUNS_PER_CASE):
                     part = seeds[first : first + RUNS_PER_CASE]
-                    cases.append(Case(experiment, data, planner, first, part, self.time_limit, __version__))
+                    cases.append(Case(experiment, data, planner, first, part, self.time_limit, __version__, law))
         return cases
 
 

@@ -54,6 +54,8 @@ class Case:
     """Time that a run may take [s]."""
     version: str
     """Version of this package."""
+    law: dict[str, str] | None = None
+    """Where to import the scenario's control law from, if it does not come with the package."""
 
     @cached_property
     def name(self) -> str:
@@ -152,8 +154,11 @@ def main() -> None:
     die_with_parent(int(sys.argv[2]))
     case = Case(**json.load(sys.stdin))
     from cbrrt_ompl.benchmark.experiment import Experiment
+    from cbrrt_ompl.motion.laws import register_origin
     from cbrrt_ompl.scenario.scenario import scenario_from_dict
 
+    if case.law is not None:
+        register_origin(case.law)
     scenario = scenario_from_dict(case.scenario)
     log = Experiment(scenario, {case.planner: case.seeds}, case.experiment).run(case.time_limit)
     Path(sys.argv[1]).write_text(format_log(log), encoding="utf-8")

@@ -9,12 +9,14 @@ from typing import Any
 
 from cbrrt_ompl.ompl_plugin.binding import ob, ou
 from cbrrt_ompl.ompl_plugin.compiled_planner import CompiledPlanner
+from cbrrt_ompl.ompl_plugin.paper_planner import PaperPlanner
 from cbrrt_ompl.ompl_plugin.setup import (
     Equipment,
     equip,
     first_solution_objective,
     make_planner,
 )
+from cbrrt_ompl.ompl_plugin.space import register_projection
 from cbrrt_ompl.planners.registry import is_compiled
 from cbrrt_ompl.scenario.scenario import Scenario
 
@@ -51,19 +53,17 @@ class Entrant(ob.Planner):  # type: ignore[misc]  # OMPL has no type information
 
     def equip(self) -> None:
         """Give the shared space information this planner's propagator and sampler, and take away all others."""
-        space = self._setup.getStateSpace()
-        self.equipment = equip(self.getSpaceInformation(), space, self._scenario, self.getName())
+        self.equipment = equip(self.getSpaceInformation(), self._scenario, self.getName())
         if self.getName() == "sst":
             self._setup.setOptimizationObjective(first_solution_objective(self.getSpaceInformation()))
 
     def prepare(self, seed: int) -> None:
         """Make the planner of a run; outside of the measured time."""
         assert self.equipment is not None
-        self.equipment.sampler = None
         ou.RNG.setSeed(seed + 1)
         self.planner = self._make(seed)
         space = self._setup.getStateSpace()
-        space.registerDefaultProjection(ob.SubspaceProjectionEvaluator(space, 0))  # the old one knows random bounds
+        register_projection(space)  # the old one knows random bounds
         self.getSpaceInformation().setup()
         self.planner.setProblemDefinition(self._setup.getProblemDefinition())
         self.planner.setup()
@@ -93,23 +93,24 @@ class Entrant(ob.Planner):  # type: ignore[misc]  # OMPL has no type information
         """Samples drawn in this run; for OMPL's own planners the rounds of their main loop."""
         if isinstance(self.planner, CompiledPlanner):
             return self.planner.search.samples if self.planner.search is not None else 0
-        sampler = self.equipment.sampler if self.equipment is not None else None
-        return self._rounds if sampler is None else sampler.samples
+        return self.planner.samples if isinstance(self.planner, PaperPlanner) else self._rounds
 
     @property
     def extension_attempts(self) -> int:
         """Extensions that were driven: the samples of this run but those refused by line 5 of Algorithm II."""
         if isinstance(self.planner, CompiledPlanner):
             return self.samples - self.planner.search.refusals if self.planner.search is not None else 0
-        sampler = self.equipment.sampler if self.equipment is not None else None
-        return self.samples - (0 if sampler is None else sampler.refused)
+        return self.planner.extension_attempts if isinstance(self.planner, PaperPlanner) else self._rounds
 
     def _make(self, seed: int) -> Any:
         """A new planner."""
         si, name = self.getSpaceInformation(), self.getName()
         if is_compiled(name):
             return CompiledPlanner(si, self._scenario, name, seed)
-        return make_planner(si, self._scenario, name)
+        made = make_planner(si, self._scenario, name)
+        if isinstance(made, PaperPlanner):
+            made.looks_around = False
+        return made
 
     def _stop_condition(self, condition: Any, end: float) -> Callable[[], bool]:
         """OMPL's condition, the end of the time and, where OMPL does the sampling, the limit of samples."""

@@ -133,10 +133,7 @@ class Experiment:
         """What the present run has found."""
         if not self._setup.haveExactSolutionPath():
             return None
-        assert self._active.equipment is not None
-        return trajectory_from_path(
-            self._setup.getSolutionPath(), self._setup.getStateSpace(), self._active.equipment.model
-        )
+        return trajectory_from_path(self._setup.getSolutionPath(), self._scenario)
 
     def _completed(self, log: Log) -> Log:
         """The log with what the entrants hide."""

@@ -7,6 +7,7 @@ import math
 from numba import njit
 
 from cbrrt_ompl.motion.kinematics import clamp, saturate, wrap_angle
+from cbrrt_ompl.motion.laws import law_command
 from cbrrt_ompl.problem.robot import Gains, Limits
 
 
@@ -81,9 +82,15 @@ def kanayama_command(
 
 @njit(cache=True)
 def tracking_command(
-    x: float, y: float, theta: float, reference: tuple[float, float, float], limits: Limits, gains: Gains
+    x: float,
+    y: float,
+    theta: float,
+    reference: tuple[float, float, float],
+    limits: Limits,
+    gains: Gains,
+    law_address: int = 0,
 ) -> tuple[float, float]:
-    """Command of CB-RRT: the Kanayama law for a reference at full speed, clamped to the limits.
+    """Command of CB-RRT: the Kanayama law for a reference at full speed, or another law, clamped to the limits.
 
     The velocities are clamped to their ranges, each on its own; then both are scaled to what the wheels can do. A
     reference behind a robot that must not reverse gives v = 0: a point turn.
@@ -95,12 +102,16 @@ def tracking_command(
         reference: (x_r, y_r, theta_r), [m, m, rad].
         limits: limits of the robot.
         gains: controller gains.
+        law_address: of another law, see :mod:`cbrrt_ompl.motion.laws`; 0 for the Kanayama law.
 
     Returns:
         Command (v, omega) within the limits of the velocities and the wheels, [m/s, rad/s].
     """
     error = error_posture(x, y, theta, reference)
-    v, omega = kanayama_command(error, limits.v_max, 0.0, gains)
+    if law_address == 0:
+        v, omega = kanayama_command(error, limits.v_max, 0.0, gains)
+    else:
+        v, omega = law_command(law_address, error, limits, gains)
     v, omega = clamp(v, limits.v_min, limits.v_max), clamp(omega, limits.omega_min, limits.omega_max)
     return saturate(v, omega, limits)
 

@@ -10,9 +10,10 @@ from numba import njit
 from cbrrt_ompl.errors import Problem, SettingsError
 from cbrrt_ompl.motion.control_laws import steering_rate, tracking_command
 from cbrrt_ompl.motion.kinematics import dynamic_step, kinematic_step, saturate
+from cbrrt_ompl.motion.laws import GAINS, LIMITS, law_address
 from cbrrt_ompl.motion.manoeuvres import BRAKE, REVERSE, approach_command, has_ended, is_manoeuvre
 from cbrrt_ompl.motion.records import Record, Records, record_array
-from cbrrt_ompl.problem.robot import Gains, Limits, Robot
+from cbrrt_ompl.problem.robot import Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, goal_distance, heading_error
 
 OPEN_LOOP, CLOSED_LOOP, STEERING = 0, 1, 2
@@ -35,12 +36,6 @@ CANDIDATES = 3
 """Extensions tried for one sample at most: the three steering rates of S-RRT."""
 
 
-LIMITS = np.dtype([(name, np.float64) for name in Limits._fields], align=True)
-"""The fields of :class:`cbrrt_ompl.problem.robot.Limits`."""
-
-GAINS = np.dtype([(name, np.float64) for name in Gains._fields], align=True)
-"""The fields of :class:`cbrrt_ompl.problem.robot.Gains`."""
-
 GOAL_REGION = np.dtype(
     [
         ("x", np.float64),  # centre [m]
@@ -57,6 +52,7 @@ GOAL_REGION = np.dtype(
 MODEL = np.dtype(
     [
         ("law", np.int64),  # OPEN_LOOP, CLOSED_LOOP or STEERING
+        ("law_address", np.int64),  # of a control law in the place of Kanayama's, see motion.laws; else 0
         ("dt", np.float64),  # integration step [s]
         ("steps", np.int64),  # of a whole extension
         ("look_ahead", np.float64),  # largest distance of the reference from its node [m]
@@ -88,6 +84,7 @@ def make_model(law: int, robot: Robot, goal: Goal, planning: PlanningSettings) -
     """
     model = record_array(1, MODEL)
     model["law"], model["dt"], model["steps"] = law, planning.step, planning.steps
+    model["law_address"] = law_address(planning.law)
     model["look_ahead"] = planning.reference_distance(robot.limits)
     model["equal_control_tolerance"] = planning.equal_control_tolerance
     model["room"] = motion_room(planning.clearance)
@@ -177,7 +174,7 @@ def advance(
     if is_manoeuvre(control):
         command = manoeuvre_command((x, y, theta, v, omega), control[2], model)
     elif model.law == CLOSED_LOOP:
-        command = tracking_command(x, y, theta, control, model.limits, model.gains)
+        command = tracking_command(x, y, theta, control, model.limits, model.gains, model.law_address)
     else:
         command = (control[0], control[1])
     command = saturate(command[0], command[1], model.limits)
@@ -209,7 +206,7 @@ def candidate(
     if model.law == STEERING:
         v, omega = saturate(model.limits.v_max, steering_rate(index, model.limits), model.limits)
         return v, omega, (v, omega, 0.0)
-    v, omega = tracking_command(node[0], node[1], node[2], reference, model.limits, model.gains)
+    v, omega = tracking_command(node[0], node[1], node[2], reference, model.limits, model.gains, model.law_address)
     if model.law == CLOSED_LOOP:
         return v, omega, reference
     return v, omega, (v, omega, 0.0)

@@ -7,10 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.motion.model import make_model
+from cbrrt_ompl.motion.model import STEERING
+from cbrrt_ompl.ompl_plugin.asked_search import AskedSearch
 from cbrrt_ompl.ompl_plugin.binding import ob, oc
-from cbrrt_ompl.ompl_plugin.reals import StateReals
-from cbrrt_ompl.ompl_plugin.space import STATE_DIMENSION, set_state
+from cbrrt_ompl.ompl_plugin.extender import Extender
+from cbrrt_ompl.ompl_plugin.goals import region_of
+from cbrrt_ompl.ompl_plugin.space import write_state
+from cbrrt_ompl.ompl_plugin.user_parts import Query, check_parts, is_same_part, query_of
+from cbrrt_ompl.ompl_plugin.warm_up import warm_up
 from cbrrt_ompl.planners.registry import planner_named
 from cbrrt_ompl.planners.search import Search
 from cbrrt_ompl.problem.settings import State
@@ -20,9 +24,13 @@ from cbrrt_ompl.scenario.scenario import Scenario
 class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type information
     """CB-RRT or S-RRT as one compiled loop.
 
-    It plans for the robot, the goal and the settings of its scenario, from the start states of the problem definition,
-    and owns its random numbers: OMPL's seed means nothing to it. It keeps its tree from one ``solve`` to the next,
-    until ``clear``.
+    It plans for robot, world and settings of its scenario, from the valid start states of the problem definition to its
+    goal, and owns its random numbers: OMPL's seed means nothing to it. Step, longest duration, validity checker,
+    propagator and goal are those that are there at ``solve``. As long as they are ours (and the goal one that the
+    kernels know), the compiled loop does everything; where a user has put others in their place, the kernels choose
+    samples, nodes and controls, and OMPL's parts judge each step between their calls, at a fraction of the speed.
+
+    ``solve`` goes on with the tree that is there, unless ``clear`` was called or starts, goal or parts have changed.
 
     Attributes:
         search: the search of the present tree; None before the first ``solve``.
@@ -33,17 +41,25 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
 
         Args:
             si: the space information of the problem.
-            scenario: robot, goal and settings.
+            scenario: robot, world and settings.
             name: `cb-rrt-compiled`, `cb-rrt-robust` or `s-rrt-compiled`.
             seed: of the first tree; the next ones go on from there. None draws a fresh one.
         """
         super().__init__(si, name)
         self.search: Search | None = None
-        self._scenario = scenario
-        row = planner_named(name)
-        self._model = make_model(row.law(scenario.planning), scenario.robot, scenario.goal, scenario.planning)
-        self._is_robust = row.is_robust
-        self._seed = seed
+        self._scenario, self._seed = scenario, seed
+        self._query: Query | None = None
+        self._goal: tuple[Any, Any] = (None, None)
+
+    def setup(self) -> None:
+        """Compile, and refuse what this planner cannot take.
+
+        Raises:
+            SettingsError: see :func:`cbrrt_ompl.ompl_plugin.user_parts.check_parts`.
+        """
+        warm_up()
+        check_parts(self.getSpaceInformation(), self._scenario, self.getName())
+        super().setup()
 
     def clear(self) -> None:
         """Forget the tree."""
@@ -52,34 +68,74 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
             self._seed += 1
         self.search = None
 
-    def solve(self, condition: Any) -> Any:
-        """Grow the tree until it reaches the goal, ``max_samples`` are drawn or the condition holds."""
+    def solve(self, condition: Any, *interval: Any) -> Any:
+        """Grow the tree until it reaches the goal, ``max_samples`` more are drawn or the condition holds.
+
+        Args:
+            condition: OMPL's condition, a function, or a time [s].
+            interval: of looking at a function, as OMPL has it; not needed here.
+        """
         self.checkValidity()
-        problem = self.getProblemDefinition()
+        si, problem = self.getSpaceInformation(), self.getProblemDefinition()
+        check_parts(si, self._scenario, self.getName())
+        should_stop = condition if callable(condition) else ob.timedPlannerTerminationCondition(float(condition))
+        self._forget_what_has_changed(problem)
         if self.search is None:
-            reals = StateReals(self.getSpaceInformation().getStateSpace(), STATE_DIMENSION)
-            starts = []
-            for i in range(problem.getStartStateCount()):
-                reals.read(problem.getStartState(i))
-                starts.append(State(*reals.values.tolist()))
+            starts = [start for start in self._query.starts if self._is_valid(start)] if self._query else []
             if not starts:
                 return ob.PlannerStatus(ob.PlannerStatus.INVALID_START)
-            planning = self._scenario.planning
-            self.search = Search(
-                self._model,
-                self._scenario.world,
-                self._scenario.robot.footprint,
-                starts,
-                self._seed,
-                goal_bias=planning.goal_bias,
-                neighbours=planning.nearest_neighbour,
-                robust=self._is_robust,
-            )
-        self.search.run(lambda _: bool(condition()), self._scenario.planning.max_samples)
+            self.search = self._new_search(starts)
+        self.search.run(lambda _: bool(should_stop()), self.search.samples + self._scenario.planning.max_samples)
         if not self.search.has_reached_goal:
             return ob.PlannerStatus(ob.PlannerStatus.TIMEOUT)
         problem.addSolutionPath(self._path(), False, 0.0, self.getName())
         return ob.PlannerStatus(ob.PlannerStatus.EXACT_SOLUTION)
+
+    def _forget_what_has_changed(self, problem: Any) -> None:
+        """Drop the tree if it was grown for other starts, another goal or other parts."""
+        query, goal = query_of(problem), problem.getGoal()
+        region = region_of(goal, self.getSpaceInformation().getStateSpace())
+        if self.search is not None:
+            is_same = self._query is not None and self._query.is_continued_by(query)
+            is_same = is_same and self._query is not None and len(self._query.starts) == len(query.starts)
+            is_same = is_same and is_same_part(self._goal[0], goal, "ompl::base::Goal") and self._goal[1] == region
+            if not is_same or (self.search.has_reached_goal and not goal.isSatisfied(self._last_state()())):
+                self.clear()
+        self._query, self._goal = query, (goal, region)
+
+    def _is_valid(self, start: State) -> bool:
+        """Whether OMPL's planners would begin at a start."""
+        si = self.getSpaceInformation()
+        state = ob.State(si.getStateSpace())
+        write_state(state, start)
+        return bool(si.satisfiesBounds(state()) and si.isValid(state()))
+
+    def _new_search(self, starts: list[State]) -> Search:
+        """A search from valid starts: compiled, or with OMPL's parts asked where they are a user's."""
+        si, scenario = self.getSpaceInformation(), self._scenario
+        extender = Extender(
+            si,
+            scenario.robot,
+            scenario.world,
+            scenario.planning,
+            kinematic=planner_named(self.getName()).law(scenario.planning) == STEERING,
+            ompl_goal=self._goal[0],
+        )
+        settings: dict[str, Any] = {
+            "seed": self._seed,
+            "goal_bias": scenario.planning.goal_bias,
+            "robust": planner_named(self.getName()).is_robust,
+        }
+        if extender.is_compiled:
+            neighbours = scenario.planning.nearest_neighbour
+            world, footprint = scenario.world, scenario.robot.footprint
+            return Search(extender.model, world, footprint, starts, neighbours=neighbours, **settings)
+        return AskedSearch(extender, si, self._goal[0], scenario, starts, **settings)
+
+    def _last_state(self) -> Any:
+        """The node added last, a scoped state."""
+        assert self.search is not None
+        return self._state(self.search.edges()[0][-1])
 
     def getPlannerData(self, data: Any) -> None:  # noqa: N802  # OMPL's name
         """Give copies of all nodes and edges away."""
@@ -95,7 +151,7 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
                 continue
             data.addVertex(vertex)
             if data.hasControls():
-                duration = float(steps[node] * self._model["dt"][0])
+                duration = float(steps[node] * self.search.model["dt"][0])
                 data.addEdge(parent, node, oc.PlannerDataEdgeControl(edges[node], duration))
             else:
                 data.addEdge(parent, node)
@@ -115,14 +171,14 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
         path.append(state())
         for node in nodes[1:]:
             state, control = self._state(states[node]), self._control(controls[node])
-            path.append(state(), control, float(steps[node] * self._model["dt"][0]))
+            path.append(state(), control, float(steps[node] * self.search.model["dt"][0]))
             self.getSpaceInformation().getControlSpace().freeControl(control)
         return path
 
     def _state(self, values: NDArray[np.float64]) -> Any:
         """A state of OMPL's, shape of the values (5,)."""
         state = ob.State(self.getSpaceInformation().getStateSpace())
-        set_state(state(), State(*values.tolist()))
+        write_state(state(), State(*values.tolist()))
         return state
 
     def _control(self, values: NDArray[np.float64]) -> Any:

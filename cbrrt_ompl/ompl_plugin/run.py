@@ -10,6 +10,8 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 from cbrrt_ompl.ompl_plugin.binding import ob, ou
+from cbrrt_ompl.ompl_plugin.compiled_methods import use_compiled_methods
+from cbrrt_ompl.ompl_plugin.paper_planner import PaperPlanner
 from cbrrt_ompl.ompl_plugin.results import trajectory_from_path, tree_from_planner
 from cbrrt_ompl.ompl_plugin.setup import Equipment, make_equipped_setup
 from cbrrt_ompl.scenario.scenario import Scenario
@@ -55,12 +57,16 @@ def run(
         on_equipped: takes what the planner was given.
         prepare: takes the ``SimpleSetup`` before it is set up, to change it.
     """
+    use_compiled_methods()  # their check compiles, and no seed may depend on it
     with _ompl, quiet_ompl():
         # OMPL complains about a second seed in a process; yet all that is random below is allocated from here on
         ou.RNG.setSeed(1 + (secrets.randbits(31) if seed is None else int(seed)))
         setup, equipment = make_equipped_setup(scenario, planner)
         on_equipped(equipment)
         prepare(setup)
+        solver = setup.getPlanner()
+        if isinstance(solver, PaperPlanner):
+            solver.looks_around = False
         setup.setup()
         rounds = _Rounds(scenario.planning.max_samples, should_stop)
         condition = ob.PlannerTerminationCondition(ob.PlannerTerminationConditionFn(rounds))
@@ -68,18 +74,18 @@ def run(
         began = time.perf_counter()
         setup.solve(condition)
         planning_time = time.perf_counter() - began
-        space, si = setup.getStateSpace(), setup.getSpaceInformation()
+        si = setup.getSpaceInformation()
         trajectory = None
         if setup.haveExactSolutionPath():
-            trajectory = trajectory_from_path(setup.getSolutionPath(), space, equipment.model)
+            trajectory = trajectory_from_path(setup.getSolutionPath(), scenario)
         data = ob.PlannerData(si)
         setup.getPlanner().getPlannerData(data)
     return Found(
         trajectory,
         nodes=data.numVertices(),
-        samples=rounds.count if equipment.sampler is None else equipment.sampler.samples,
+        samples=solver.samples if isinstance(solver, PaperPlanner) else rounds.count,
         planning_time=planning_time,
-        make_tree=lambda: tree_from_planner(setup.getPlanner(), si, space, equipment.model),
+        make_tree=lambda: tree_from_planner(setup.getPlanner(), si, equipment.model),
     )
 
 

@@ -1,145 +1,149 @@
-"""Directed control samplers: a whole extension of CB-RRT or S-RRT behind one call of OMPL's control::RRT."""
+"""Directed control samplers: a whole extension of CB-RRT or S-RRT behind one call of OMPL's planners."""
 
 from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-from numba import njit
-from numpy.typing import NDArray
-
-from cbrrt_ompl.collision.scene import Scene
-from cbrrt_ompl.motion.model import control_dimension
-from cbrrt_ompl.motion.records import Records, record_array
+from cbrrt_ompl.collision.world import World
+from cbrrt_ompl.motion.records import record_array
 from cbrrt_ompl.ompl_plugin.binding import oc
+from cbrrt_ompl.ompl_plugin.children import Children
+from cbrrt_ompl.ompl_plugin.compiled_methods import use_compiled_methods
+from cbrrt_ompl.ompl_plugin.extender import Extender
+from cbrrt_ompl.ompl_plugin.native_methods import SAMPLER_RECORD, enter_scene, make_sampler_native
 from cbrrt_ompl.ompl_plugin.reals import StateReals
 from cbrrt_ompl.ompl_plugin.space import STATE_DIMENSION
-from cbrrt_ompl.planners.extension import CHILD, EXTENDED, NO_CHILD, REFUSED, UNTRIED, extend
-from cbrrt_ompl.planners.roll_out import STEPS, margin_at
+from cbrrt_ompl.planners.extension import EXTENDED, REFUSED
+from cbrrt_ompl.problem.robot import Robot
+from cbrrt_ompl.problem.settings import Goal, PlanningSettings
 
-EXTENSION = np.dtype(
-    [
-        ("steps", np.int64),  # integration steps
-        ("v_command", np.float64),  # that line 5 compares [m/s, rad/s]
-        ("omega_command", np.float64),
-        ("control", np.float64, (3,)),  # see advance of the model
-        ("block", STEPS),  # room for the kernel
-    ],
-    align=True,
-)
-"""What a kernel hands to a sampler in Python."""
+LOOK_PERIOD = 4096
+"""Extensions after which a sampler looks again whether the parts of its space information are still the same; that one
+goes through Python, which lets a Ctrl-C through."""
 
 
 class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL has no type information
-    """Extends a node of control::RRT towards a sample, by Algorithm II of the paper.
+    """Extends a node of a tree towards a sample, by Algorithm II of the paper.
 
     Contract with OMPL: ``source`` is the node and is only read; ``dest`` holds the sample and, where the extension
     succeeds, takes the state at its end; ``control`` takes the control. The result is the number of propagation steps,
-    or 0 where nothing is to be added. The way is checked for collision here and nowhere else; it ends early at the
-    first state in the goal region. OMPL makes one sampler a tree, so the sampler remembers the children of its nodes.
+    or 0 where nothing is to be added. The motion is checked in here and nowhere else; it ends early at the first state
+    in the goal, as far as a goal is known. OMPL makes one sampler a tree, so the sampler remembers the children of its
+    nodes.
+
+    What the space information was given is obeyed, see :class:`cbrrt_ompl.ompl_plugin.extender.Extender`: its step, its
+    longest duration, and a validity checker or a propagator of a user's own.
 
     Attributes:
-        samples: calls so far.
-        refused: calls refused by line 5 of Algorithm II.
-        children: nodes made so far.
+        extender: does the work.
     """
 
-    def __init__(self, si: Any, space: Any, model: Records, scene: Scene) -> None:
+    kinematic = False
+    """Whether the velocities jump."""
+
+    def __init__(
+        self,
+        si: Any,
+        robot: Robot,
+        world: World,
+        planning: PlanningSettings | None = None,
+        *,
+        goal: Goal | None = None,
+        ompl_goal: Any = None,
+        compiled: bool | None = None,
+    ) -> None:
         """Make the buffers.
 
         Args:
-            si: the space information that allocates this sampler.
-            space: its state space. (References to ``si`` itself would make a cycle that Python cannot see.)
-            model: see :func:`cbrrt_ompl.motion.model.make_model`.
-            scene: world and footprint, see :meth:`cbrrt_ompl.World.scene`.
+            si: the space information that allocates this sampler; what OMPL hands to an allocator does.
+            robot: limits, gains and footprint.
+            world: obstacles and walls.
+            planning: settings of the extension; None takes the defaults. Step and horizon are those of ``si``.
+            goal: region that ends an extension, and that final approaches lead to; None where it is not known.
+            ompl_goal: goal of a problem definition, in the place of ``goal``, see :meth:`aim_at`.
+            compiled: whether OMPL calls compiled code, see :mod:`cbrrt_ompl.ompl_plugin.compiled_methods`.
         """
         super().__init__(si)
-        self.samples = 0
-        self.refused = 0
+        self._record = record_array(1, SAMPLER_RECORD)
+        self.extender = Extender(si, robot, world, planning, kinematic=self.kinematic, goal=goal, ompl_goal=ompl_goal)
+        space = si.getStateSpace()
         self._node, self._sample = StateReals(space, STATE_DIMENSION), StateReals(space, STATE_DIMENSION)
-        self._model, self._scene = model, scene
-        self._control_dimension = control_dimension(model)
-        self._extension = record_array(1, EXTENSION)
-        self._first_child: dict[bytes, int] = {}
-        self._children = record_array(64, CHILD)
-        self.children = 0
+        self._control_dimension = si.getControlSpace().getDimension()
+        self._children = Children()
+        self._tell_record()
+        if type(self).sampleTo is _SAMPLE_TO and use_compiled_methods(compiled):
+            make_sampler_native(self, self._record)
+
+    def aim_at(self, goal: Any) -> None:
+        """Plan for a goal of OMPL's: it ends the extensions from now on.
+
+        Args:
+            goal: any goal of a problem definition.
+        """
+        self.extender.aim_at(goal)
+        self._tell_record()
+
+    @property
+    def samples(self) -> int:
+        """Calls so far."""
+        return int(self._record["samples"][0])
+
+    @property
+    def refused(self) -> int:
+        """Calls refused by line 5 of Algorithm II."""
+        return int(self._record["refused"][0])
+
+    @property
+    def children(self) -> int:
+        """Nodes made so far."""
+        return len(self._children)
 
     def sampleTo(self, control: Any, *states: Any) -> int:  # noqa: N802  # OMPL's name
         """Extend ``states[-2]`` towards ``states[-1]``; OMPL may pass the node's control before them."""
         source, dest = states[-2:]
-        self.samples += 1
+        extender, children = self.extender, self._children
+        self._record["samples"] += 1
+        if self.samples % LOOK_PERIOD == 0:
+            extender.look_again()
+            self._tell_record()
         self._node.read(source)
         self._sample.read(dest)
-        node = self._node.values.tobytes()
-        first_child = self._first_child.setdefault(node, UNTRIED)
-        outcome = extend_values(
-            self._node.values,
-            self._sample.values,
-            first_child,
-            self._children,
-            *self._scene,
-            self._model,
-            self._extension,
-        )
-        if first_child == UNTRIED:
-            self._first_child[node] = NO_CHILD
+        if children.make_room():
+            self._tell_record()
+        slot = children.slot(self._node.values)
+        x, y = self._sample.values[0], self._sample.values[1]
+        outcome = extender.extend(source, self._node.values, x, y, children.first_child(slot), children.records)
+        children.note_trial(slot)
         if outcome != EXTENDED:
-            self.refused += outcome == REFUSED
+            self._record["refused"] += outcome == REFUSED
             return 0
-        steps, v, omega, controls, _ = self._extension[0]
-        self._remember(node, v, omega)
+        children.add(slot, *extender.command)
         for i in range(self._control_dimension):
-            control[i] = float(controls[i])
+            control[i] = extender.control[i]
+        self._sample.values[:] = extender.end
         self._sample.write(dest)
-        return int(steps)
+        return extender.steps
 
-    def _remember(self, node: bytes, v: float, omega: float) -> None:
-        """Note the command of a new child, for line 5 of Algorithm II."""
-        child = self.children
-        if child == len(self._children):
-            larger = record_array(2 * child, CHILD)
-            larger[:child] = self._children
-            self._children = larger
-        self._children[child] = v, omega, self._first_child[node], 0
-        self._first_child[node] = child
-        self.children = child + 1
+    def _tell_record(self) -> None:
+        """Tell the compiled method where everything is, and whether it may decide."""
+        record, extender, children = self._record, self.extender, self._children
+        enter_scene(record, extender.scene)
+        record["model"], record["block"] = extender.model.ctypes.data, extender.block.ctypes.data
+        record["parents"], record["children"] = children.parents.ctypes.data, children.records.ctypes.data
+        record["counts"], record["capacity"] = children.counts.ctypes.data, len(children.records)
+        record["slots"], record["dimension"] = len(children.parents), self._control_dimension
+        record["is_compiled"] = extender.is_compiled and extender.has_compiled_law
+        record["look_period"] = LOOK_PERIOD
+
+
+_SAMPLE_TO = ExtensionSampler.sampleTo
 
 
 class KanayamaDirectedControlSampler(ExtensionSampler):
-    """CB-RRT: the Kanayama law under acceleration limits, once an extension or in closed loop (as the model says)."""
+    """CB-RRT: the Kanayama law under acceleration limits, once an extension or in closed loop (as the settings say)."""
 
 
 class SteeringDirectedControlSampler(ExtensionSampler):
-    """S-RRT: full speed at the best of three steering rates."""
+    """S-RRT: full speed at the best of three steering rates, for a kinematic propagator."""
 
-
-@njit(cache=True)
-def extend_values(
-    node: NDArray[np.float64],
-    sample: NDArray[np.float64],
-    first_child: int,
-    children: Records,
-    frame: Records,
-    cells: Records,
-    pieces: Records,
-    corners: Records,
-    models: Records,
-    extensions: Records,
-) -> int:
-    """:func:`extend` for a caller in Python: arrays in; the outcome, the end in ``sample`` and a record out."""
-    scene, model, found = Scene(frame, cells, pieces, corners), models[0], extensions[0]
-    state = (node[0], node[1], node[2], node[3], node[4])
-    margin = margin_at(node[0], node[1], node[2], scene, model.room)
-    extension = extend(state, margin, (sample[0], sample[1]), first_child, children, scene, model, found.block)
-    found.steps = extension.steps
-    found.v_command, found.omega_command = extension.command
-    found.control[0], found.control[1], found.control[2] = extension.control
-    if extension.outcome == EXTENDED:
-        sample[0], sample[1], sample[2], sample[3], sample[4] = extension.state
-    return extension.outcome
-
-
-def warm_up_sampler(model: Records, scene: Scene) -> None:
-    """Load or compile the samplers' kernel."""
-    node, sample = np.array([0.5, 0.5, 0.0, 0.0, 0.0]), np.array([0.6, 0.6, 0.0, 0.0, 0.0])
-    extend_values(node, sample, NO_CHILD, record_array(1, CHILD), *scene, model, record_array(1, EXTENSION))
+    kinematic = True

@@ -2,57 +2,48 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from cbrrt_ompl.motion.model import CLOSED_LOOP, check_step, make_model
+from cbrrt_ompl.motion.model import CLOSED_LOOP, STEERING, check_step
 from cbrrt_ompl.motion.records import Records
 from cbrrt_ompl.ompl_plugin.binding import ob, oc
+from cbrrt_ompl.ompl_plugin.compiled_methods import use_compiled_methods
 from cbrrt_ompl.ompl_plugin.compiled_planner import CompiledPlanner
 from cbrrt_ompl.ompl_plugin.decomposition import PositionDecomposition
 from cbrrt_ompl.ompl_plugin.goals import make_goal
+from cbrrt_ompl.ompl_plugin.native_space import make_native
+from cbrrt_ompl.ompl_plugin.paper_planner import PaperPlanner
 from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
-from cbrrt_ompl.ompl_plugin.samplers import (
-    ExtensionSampler,
-    KanayamaDirectedControlSampler,
-    SteeringDirectedControlSampler,
-)
-from cbrrt_ompl.ompl_plugin.space import make_control_space, make_reference_space, make_state_space, set_state
+from cbrrt_ompl.ompl_plugin.space import make_control_space, make_reference_space, make_state_space, write_state
 from cbrrt_ompl.ompl_plugin.validity import FclStateValidityChecker
-from cbrrt_ompl.planners.registry import Backend, Steering, planner_named
+from cbrrt_ompl.planners.registry import Backend, planner_named
 from cbrrt_ompl.scenario.scenario import Scenario, check_scenario
 
 FREE_VOLUME_SAMPLES = 8192
 """States by which Syclop estimates the free volume of its cells before it looks at the clock: 8 a cell, not 98."""
 
 
-SAMPLERS: dict[Steering, type[ExtensionSampler]] = {
-    Steering.KANAYAMA: KanayamaDirectedControlSampler,
-    Steering.RATES: SteeringDirectedControlSampler,
-}
-"""The directed samplers of the planners that OMPL's control::RRT runs for us."""
-
-
 @dataclass
 class Equipment:
-    """What one planner was given: its model and, once it has begun, its sampler.
+    """What one planner was given.
 
     Attributes:
-        model: see :func:`cbrrt_ompl.motion.model.make_model`.
-        sampler: the sampler allocated last; None for OMPL's own planners.
+        model: of its propagator, see :func:`cbrrt_ompl.motion.model.make_model`.
     """
 
     model: Records
-    sampler: ExtensionSampler | None = None
 
 
-def make_setup(scenario: Scenario, planner: str = "cb-rrt") -> Any:
+def make_setup(scenario: Scenario, planner: str = "cb-rrt", compiled: bool | None = None) -> Any:
     """A scenario as an ordinary ``ompl.control.SimpleSetup``, ready for ``solve``.
 
     Args:
         scenario: world, robot, start, goal and settings.
         planner: `cb-rrt`, `s-rrt`, `cb-rrt-compiled`, `s-rrt-compiled`, `cb-rrt-robust`, or a planner of OMPL: `rrt`,
             `kpiece1`, `est`, `sst`, `pdst`, `syclop-rrt`, `syclop-est`.
+        compiled: whether OMPL calls compiled code in the place of our Python methods, with the same results bit for
+            bit; None: yes, unless the environment has ``CBRRT_OMPL_COMPILED_METHODS=0``.
 
     Returns:
         The set-up with state space, validity checker, propagator, start, goal and planner. Its limits are OMPL's: pass
@@ -63,88 +54,93 @@ def make_setup(scenario: Scenario, planner: str = "cb-rrt") -> Any:
         UnknownPlannerError: if there is no such planner.
         SettingsError: if the step is too long for the robot.
     """
-    return make_equipped_setup(scenario, planner)[0]
+    return make_equipped_setup(scenario, planner, compiled)[0]
 
 
-def make_equipped_setup(scenario: Scenario, planner: str = "cb-rrt") -> tuple[Any, Equipment]:
+def make_equipped_setup(
+    scenario: Scenario, planner: str = "cb-rrt", compiled: bool | None = None
+) -> tuple[Any, Equipment]:
     """:func:`make_setup` together with what the planner was given.
 
     Args:
         scenario: world, robot, start, goal and settings.
         planner: see :func:`make_setup`.
+        compiled: see :func:`make_setup`.
     """
+    compiled = use_compiled_methods(compiled)
     check_scenario(scenario)
     row = planner_named(planner)
     check_step(scenario.robot, scenario.planning)
     limits, bounds = scenario.robot.limits, scenario.world.bounds
-    space = make_state_space(bounds, limits)
+    space = make_state_space(bounds, limits, compiled)
     if row.law(scenario.planning) == CLOSED_LOOP:
-        setup = oc.SimpleSetup(make_reference_space(space, bounds))
+        setup = oc.SimpleSetup(make_reference_space(space, bounds, compiled))
     else:
-        setup = oc.SimpleSetup(make_control_space(space, limits, scenario.planning.approaches(scenario.goal)))
+        has_manoeuvres = scenario.planning.approaches(scenario.goal)
+        setup = oc.SimpleSetup(make_control_space(space, limits, has_manoeuvres, compiled))
     si = setup.getSpaceInformation()
     si.setPropagationStepSize(scenario.planning.step)
     si.setMinMaxControlDuration(1, scenario.planning.steps)
-    setup.setStateValidityChecker(FclStateValidityChecker(si, space, scenario.world, scenario.robot.footprint))
+    setup.setStateValidityChecker(FclStateValidityChecker(si, scenario.robot, scenario.world, compiled=compiled))
     start = ob.State(space)
-    set_state(start(), scenario.start)
+    write_state(start(), scenario.start)
     setup.setStartState(start)
-    setup.setGoal(make_goal(si, space, scenario.goal))
-    equipment = equip(si, space, scenario, planner)
-    setup.setPlanner(make_planner(si, scenario, planner))
+    setup.setGoal(make_goal(si, space, scenario.goal, compiled))
+    equipment = equip(si, scenario, planner, compiled)
+    setup.setPlanner(make_planner(si, scenario, planner, compiled))
     if planner == "sst":
-        setup.setOptimizationObjective(first_solution_objective(si))
+        setup.setOptimizationObjective(first_solution_objective(si, compiled))
     return setup, equipment
 
 
-def equip(si: Any, space: Any, scenario: Scenario, planner: str) -> Equipment:
-    """Give a space information the propagator and the directed sampler of one planner, and take away all others.
+def equip(si: Any, scenario: Scenario, planner: str, compiled: bool | None = None) -> Equipment:
+    """Give a space information the propagator of one planner, and take away all others' parts.
 
     Args:
         si: the space information that the planner will use.
-        space: its state space.
         scenario: robot, goal and settings.
         planner: a known planner's name.
+        compiled: see :func:`make_setup`.
     """
-    row = planner_named(planner)
-    equipment = Equipment(make_model(row.law(scenario.planning), scenario.robot, scenario.goal, scenario.planning))
-    si.setStatePropagator(TwoWheelPropagator(si, space, equipment.model))
+    law = planner_named(planner).law(scenario.planning)
+    propagator = TwoWheelPropagator(
+        si,
+        scenario.robot,
+        replace(scenario.planning, closed_loop=law == CLOSED_LOOP),
+        kinematic=law == STEERING,
+        goal=scenario.goal,
+        compiled=compiled,
+    )
+    si.setStatePropagator(propagator)
     si.clearDirectedSamplerAllocator()
-    if row.backend is Backend.PLUGIN:
-        sampler_class, scene = SAMPLERS[row.steering], scenario.world.scene(scenario.robot.footprint)
-
-        def allocate(owner: Any) -> ExtensionSampler:
-            equipment.sampler = sampler_class(owner, space, equipment.model, scene)
-            return equipment.sampler
-
-        si.setDirectedControlSamplerAllocator(oc.DirectedControlSamplerAllocator(allocate))
-    return equipment
+    return Equipment(propagator.model)
 
 
-def make_planner(si: Any, scenario: Scenario, planner: str) -> Any:
+def make_planner(si: Any, scenario: Scenario, planner: str, compiled: bool | None = None) -> Any:
     """A planner under our name; for `cb-rrt` and `s-rrt` control::RRT, with the scenario's goal bias.
 
     Args:
         si: the equipped space information.
         scenario: bounds (for Syclop's grid), goal bias, and all that the compiled planners plan for.
         planner: a known planner's name.
+        compiled: see :func:`make_setup`.
     """
     row = planner_named(planner)
     if row.backend is Backend.COMPILED:
         return CompiledPlanner(si, scenario, planner)
+    if row.backend is Backend.PLUGIN:
+        return PaperPlanner(si, scenario, planner, compiled)
     if row.ompl_class.startswith("Syclop"):
         made = getattr(oc, row.ompl_class)(si, PositionDecomposition(scenario.world.bounds))
         made.setNumFreeVolumeSamples(FREE_VOLUME_SAMPLES)
     else:
         made = getattr(oc, row.ompl_class)(si)
-    if row.backend is Backend.PLUGIN:
-        made.setGoalBias(scenario.planning.goal_bias)
     made.setName(planner)
     return made
 
 
-def first_solution_objective(si: Any) -> Any:
+def first_solution_objective(si: Any, compiled: bool | None = None) -> Any:
     """Path length, any: lets SST end with its first solution, as all the other planners do."""
     objective = ob.PathLengthOptimizationObjective(si)
     objective.setCostThreshold(objective.infiniteCost())
-    return objective
+    return make_native(objective) if use_compiled_methods(compiled) else objective

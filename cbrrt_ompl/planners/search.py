@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cbrrt_ompl.collision.world import World
+from cbrrt_ompl.motion.laws import raise_errors
 from cbrrt_ompl.motion.records import Records, record_array
 from cbrrt_ompl.planners.growth import (
     DRAWS,
@@ -125,6 +126,7 @@ class Search:
             elif status == GROW_WANTS_ROOM:
                 self._make_room()
             else:
+                raise_errors()
                 self.has_reached_goal = status == GROW_REACHED
                 return
 

@@ -146,7 +146,9 @@ class PlanningSettings:
     look_ahead: float | None = None
     """Largest distance of the reference from its node [m]; None is ``v_max * horizon``."""
     closed_loop: bool = False
-    """Evaluate the Kanayama law at every step instead of once an extension."""
+    """Evaluate the control law at every step instead of once an extension."""
+    law: str = "kanayama"
+    """Control law of CB-RRT by name: ``kanayama``, ``posq``, or one of :func:`cbrrt_ompl.register_law`."""
     final_approach: bool = True
     """Try from every node to brake, turn, drive straight onto the goal's centre and turn to its heading, at rest; only
     for goals that restrict heading or speed."""
@@ -183,6 +185,8 @@ class PlanningSettings:
             problems.append(Problem("planning.equal_control_tolerance", self.equal_control_tolerance, A_NUMBER))
         if not (is_number(self.clearance, LARGEST) and self.clearance >= 0.0):
             problems.append(Problem("planning.clearance", self.clearance, "a distance of 0 or more [m]"))
+        if not (isinstance(self.law, str) and self.law):
+            problems.append(Problem("planning.law", self.law, "the name of a control law"))
         if self.look_ahead is not None and not _is_positive(self.look_ahead):
             problems.append(Problem("planning.look_ahead", self.look_ahead, f"{A_POSITIVE_NUMBER} [m]"))
         if not isinstance(self.closed_loop, bool | np.bool_):

@@ -274,6 +274,7 @@ PLANNING = {
     "equal_control_tolerance": Key(number),
     "look_ahead": Key(number),
     "closed_loop": Key(flag),
+    "law": Key(text),
     "final_approach": Key(flag),
     "brake_safe": Key(flag),
     "clearance": Key(number),

@@ -7,6 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cbrrt_ompl.motion.control_laws import reference_pose
+from cbrrt_ompl.motion.laws import raise_errors
 from cbrrt_ompl.motion.model import CANDIDATES, STEERING, advance, candidate
 from cbrrt_ompl.motion.records import Records
 from cbrrt_ompl.problem.robot import Limits
@@ -33,6 +34,7 @@ def trajectory_from_controls(
         The trajectory on the integration grid, from time 0, with the limits of the model.
     """
     states, commands = replay_path(start, controls, steps, model)
+    raise_errors()
     t = model["dt"][0] * np.arange(len(states))
     limits = Limits(*model["limits"][0].tolist())
     return Trajectory(t, *states.T, *commands.T, kinematic=model["law"][0] == STEERING, limits=limits)

@@ -1,0 +1,100 @@
+"""What a round of a planner costs inside OMPL, with compiled and with Python methods behind OMPL's virtual calls.
+
+A round is one pass of the planner's main loop: one extension attempt of cb-rrt and s-rrt. The goal is out of reach, so
+that every run has as many rounds as asked. Printed is the CPU time, in microseconds, of the best of some repetitions,
+each the sum over some seeds; both kinds of methods take turns, and find the same trees.
+
+    python benchmarks/ompl_speed.py
+    python benchmarks/ompl_speed.py --planners cb-rrt rrt --rounds 2000 --robot rectangle
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import time
+from dataclasses import replace
+
+from cbrrt_ompl import Footprint, Goal, Robot, Scenario, load_scenario
+from cbrrt_ompl.ompl_plugin.compiled_methods import VARIABLE
+from cbrrt_ompl.ompl_plugin.run import run
+from cbrrt_ompl.planners.registry import PLANNERS, Backend
+from cbrrt_ompl.planning import warm_up_planner
+
+OUT_OF_REACH = Goal(0.0, 0.0, tolerance=1e-12)
+FOOTPRINTS = {
+    "point": Footprint.point(),
+    "disc": Footprint.disc(0.15),
+    "rectangle": Footprint.polygon([(-0.15, -0.1), (0.15, -0.1), (0.15, 0.1), (-0.15, 0.1)]),
+}
+
+
+def cost(scenario: Scenario, planner: str, rounds: int, seed: int) -> tuple[float, int]:
+    """CPU time of some rounds [s], and the nodes they made."""
+    times: list[float] = []
+
+    def should_stop(count: int) -> bool:
+        if count < rounds:
+            return False
+        times.append(time.process_time())
+        return True
+
+    found = run(scenario, planner, seed, lambda: times.append(time.process_time()), should_stop)
+    return times[1] - times[0], found.nodes
+
+
+def costs(
+    scenario: Scenario, planner: str, rounds: int, seeds: int, repetitions: int, python_repetitions: int
+) -> tuple[float, float, float]:
+    """Microseconds a round with compiled and with Python methods, and nodes a run."""
+    best = {"1": math.inf, "0": math.inf}
+    nodes: dict[str, list[int]] = {}
+    for repetition in range(repetitions):
+        for kind in best:
+            if kind == "0" and repetition >= python_repetitions:
+                continue
+            os.environ[VARIABLE] = kind
+            found = [cost(scenario, planner, rounds, seed) for seed in range(seeds)]
+            best[kind] = min(best[kind], sum(seconds for seconds, _ in found) / (rounds * seeds))
+            nodes[kind] = [count for _, count in found]
+    if nodes["0"] != nodes["1"]:
+        raise AssertionError(f"{planner}: compiled and Python methods make other trees")
+    return 1e6 * best["1"], 1e6 * best["0"], sum(nodes["1"]) / seeds
+
+
+def main() -> None:
+    """Print one table."""
+    planners = [name for name, planner in PLANNERS.items() if planner.backend is not Backend.COMPILED]
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--planners", nargs="+", default=planners)
+    parser.add_argument("--rounds", type=int, default=500)
+    parser.add_argument("--seeds", type=int, default=4)
+    parser.add_argument("--repetitions", type=int, default=7)
+    parser.add_argument("--python-repetitions", type=int, default=2, help="the Python methods are slow (default 2)")
+    parser.add_argument("--robot", nargs="+", choices=list(FOOTPRINTS), default=["point", "rectangle"])
+    parser.add_argument("--scenario", default="paper_case1")
+    arguments = parser.parse_args()
+    base = load_scenario(arguments.scenario)
+    base = replace(base, goal=OUT_OF_REACH, planning=replace(base.planning, max_samples=10**9))
+    print(f"us of CPU a round, {arguments.rounds} rounds, {arguments.scenario}")
+    print(f"{'':24}{'compiled':>10}{'Python':>10}{'ratio':>8}{'nodes':>8}")
+    for robot in arguments.robot:
+        scenario = replace(base, robot=Robot(FOOTPRINTS[robot], base.robot.limits, base.robot.gains))
+        for planner in arguments.planners:
+            warm_up_planner(planner)
+            cost(scenario, planner, 10, 0)
+            compiled, python, nodes = costs(
+                scenario,
+                planner,
+                arguments.rounds,
+                arguments.seeds,
+                arguments.repetitions,
+                arguments.python_repetitions,
+            )
+            name = f"{robot}: {planner}"
+            print(f"{name:24}{compiled:>10.2f}{python:>10.1f}{python / compiled:>8.1f}{nodes:>8.0f}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

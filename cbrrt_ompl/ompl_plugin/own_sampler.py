@@ -1,0 +1,116 @@
+"""Planners of OMPL's that extend by a directed sampler of their own, whatever others on their space information do.
+
+A space information has one directed sampler for all of its planners, and who asks for it cannot be told. So a planner
+with its own one puts it there for as long as it sets itself up or solves, and takes it away again.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from typing import Any
+
+from cbrrt_ompl.ompl_plugin.binding import oc
+
+DEFAULT_SAMPLERS = ("SimpleDirectedControlSampler", "SteeredControlSampler")
+"""What a space information allocates if nothing else is set: random controls, or a propagator that can steer."""
+
+
+def with_directed_sampler(planner: type, si: Any, allocate: Callable[[Any], Any], *arguments: Any) -> Any:
+    """A planner of OMPL's with a directed sampler of its own.
+
+    Other planners on the same space information, in one ``ompl.tools.Benchmark`` for example, keep OMPL's::
+
+        est = with_directed_sampler(oc.EST, si, lambda si: KanayamaDirectedControlSampler(si, robot, world))
+
+    Args:
+        planner: a class of OMPL's, such as ``oc.RRT`` or ``oc.EST``.
+        si: the space information.
+        allocate: makes the sampler, given the space information.
+        arguments: further arguments of the class.
+
+    Returns:
+        An object of a class derived from ``planner``.
+    """
+    made = _class_with_sampler(planner)(si, *arguments)
+    made._allocate_by = allocate
+    return made
+
+
+class OwnSampler:
+    """To be derived from together with a planner class of OMPL's, before it.
+
+    Attributes:
+        sampler: the one allocated last; None before the first.
+        looks_around: whether a directed sampler that a user has put into the space information is looked for. That
+            takes one of the seeds that OMPL deals out.
+    """
+
+    sampler: Any = None
+    looks_around = True
+    _allocate_by: Callable[[Any], Any] | None = None
+    _is_in_place = False  # OMPL's solve with a time calls the solve with a condition
+
+    def allocate(self, si: Any) -> Any:
+        """Make the sampler of a tree."""
+        assert self._allocate_by is not None
+        return self._allocate_by(si)
+
+    def setup(self) -> None:
+        """Set the planner up; Syclop planners allocate their sampler here."""
+        with self._own_sampler():
+            super().setup()  # type: ignore[misc]  # OMPL's
+
+    def solve(self, *condition: Any) -> Any:
+        """Solve; the other planners allocate their sampler here, the first time after ``clear``."""
+        with self._own_sampler():
+            return super().solve(*condition)  # type: ignore[misc]  # OMPL's
+
+    def clear(self) -> None:
+        """Forget tree and sampler."""
+        super().clear()  # type: ignore[misc]  # OMPL's
+        self.sampler = None
+
+    @contextmanager
+    def _own_sampler(self) -> Iterator[None]:
+        """Have the space information allocate this planner's sampler."""
+        si = self.getSpaceInformation()  # type: ignore[attr-defined]  # OMPL's
+        if self._is_in_place or self._is_overruled(si):
+            yield
+            return
+        was_set_up = si.isSetup()
+        si.setDirectedControlSamplerAllocator(oc.DirectedControlSamplerAllocator(self._allocate))
+        self._is_in_place = True
+        try:
+            yield
+        finally:
+            self._is_in_place = False
+            si.clearDirectedSamplerAllocator()
+            if was_set_up:
+                si.setup()
+
+    def _allocate(self, si: Any) -> Any:
+        self.sampler = self.allocate(si)
+        return self.sampler
+
+    def _is_overruled(self, si: Any) -> bool:
+        """Whether a user has put another directed sampler into the space information: that one is obeyed."""
+        if not self.looks_around or self.sampler is not None:
+            return False
+        found = type(si.allocDirectedControlSampler()).__name__
+        if found in DEFAULT_SAMPLERS:
+            return False
+        warnings.warn(
+            f"{self.getName()} extends by {found}, which the space information has for all of its planners, "  # type: ignore[attr-defined]
+            "instead of its own directed sampler; si.clearDirectedSamplerAllocator() takes it away, and "
+            "with_directed_sampler() gives it to one planner alone",
+            stacklevel=6,
+        )
+        return True
+
+
+@cache
+def _class_with_sampler(planner: type) -> type:
+    return type(f"{planner.__name__}WithSampler", (OwnSampler, planner), {})
