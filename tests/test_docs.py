@@ -21,14 +21,14 @@ import cbrrt_ompl
 from cbrrt_ompl.cli import build_parser
 from cbrrt_ompl.problem.robot import Gains, Limits
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
-from cbrrt_ompl.scenario import scenario_file
+from cbrrt_ompl.scenario import map_layers, scenario_file
 from cbrrt_ompl.scenario.scenario import load_scenario
 from cbrrt_ompl.scenario.sections import Key
 
 SECTIONS: dict[str, Mapping[str, Key]] = {
     "Top level": scenario_file.SCENARIO,
     **scenario_file.OBSTACLES,
-    "map": scenario_file.MAP,
+    "map": map_layers.MAP,
     "robot": scenario_file.ROBOT,
     "robot.footprint": {name: key for keys in scenario_file.FOOTPRINTS.values() for name, key in keys.items()},
     "robot.limits": scenario_file.LIMITS,

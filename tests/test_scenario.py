@@ -420,7 +420,7 @@ MISTAKES = {
     "map that is a number": (
         "obstacles:\n",
         "map: 3\nobstacles:\n",
-        "map: got 3, expected a mapping with the keys file, unknown, resolution",
+        "map: got 3, expected a mapping with the keys file, unknown, resolution, keepout",
     ),
     "unknown cells": (
         "obstacles:\n",
@@ -708,7 +708,11 @@ def test_saving_where_nothing_can_be_written_is_one_line(tmp_path: Path) -> None
 
 
 class FakeMap:
+    remarks = ()
+
     """A map of one wall, and one cell that nobody has seen."""
+
+    remarks = ()
 
     def bounds(self) -> Bounds:
         return Bounds((0.0, 0.0), (4.0, 3.0))

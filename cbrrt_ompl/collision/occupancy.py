@@ -159,6 +159,13 @@ class GridLayer:
     @cached_property
     def obstacles(self) -> tuple[Obstacle, ...]:
         """Boxes where the grid lies along the axes; else oriented boxes and a triangle in each corner of the bounds."""
+        is_straight = _quarter_turns(self.origin[2]) is not None
+        outer = () if is_straight else _outer_corners(self.blocked.shape, self.resolution, self.origin)
+        return (*self.boxes, *outer)
+
+    @property
+    def boxes(self) -> tuple[Obstacle, ...]:
+        """The obstacles that cover the cells, without what lies outside of the grid."""
         lows, highs = self._rectangles
         if _quarter_turns(self.origin[2]) is not None:
             return tuple(
@@ -166,8 +173,7 @@ class GridLayer:
             )
         centers, sizes, yaw = 0.5 * (lows + highs), (highs - lows).tolist(), self.origin[2]
         placed = _in_world(centers, self.origin).tolist()
-        boxes = [OrientedBox((x, y), (w, h), yaw) for (x, y), (w, h) in zip(placed, sizes, strict=True)]
-        return *boxes, *_outer_corners(self.blocked.shape, self.resolution, self.origin)
+        return tuple(OrientedBox((x, y), (w, h), yaw) for (x, y), (w, h) in zip(placed, sizes, strict=True))
 
     @cached_property
     def pieces(self) -> Pieces:

@@ -14,7 +14,8 @@ from cbrrt_ompl.errors import MISSING, InputError, Problem, Remark, ScenarioErro
 from cbrrt_ompl.files import as_path, write_file
 from cbrrt_ompl.problem.robot import Limits, Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
-from cbrrt_ompl.scenario.scenario_file import MapSource, read_parts, scenario_data
+from cbrrt_ompl.scenario.map_layers import MapSource
+from cbrrt_ompl.scenario.scenario_file import read_parts, scenario_data
 from cbrrt_ompl.scenario.sections import Report
 
 HORIZON_TOLERANCE = 0.01

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cbrrt_ompl.collision.occupancy import UNKNOWN_CELLS
 from cbrrt_ompl.collision.world import World
-from cbrrt_ompl.errors import MISSING, InputError, Problem
+from cbrrt_ompl.errors import MISSING
 from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, Obstacle, OrientedBox, Polygon
 from cbrrt_ompl.problem.ready_robots import ROBOTS
 from cbrrt_ompl.problem.robot import Footprint, Gains, Limits, Robot
 from cbrrt_ompl.problem.settings import CUT_EXTENSION, NEAREST_NEIGHBOUR, Goal, PlanningSettings, State
+from cbrrt_ompl.scenario.map_layers import load_layers, map_layers, source_data
 from cbrrt_ompl.scenario.sections import (
     Key,
     Report,
@@ -36,20 +35,6 @@ if TYPE_CHECKING:
     from cbrrt_ompl.scenario.scenario import Scenario
 
 
-@dataclass(frozen=True)
-class MapSource:
-    """The map that a world was read from, kept so that a scenario is saved with it and not with its obstacles."""
-
-    file: Path
-    """The map's file, absolute."""
-    obstacles: int
-    """How many of the world's obstacles came from it: the first ones."""
-    unknown: str = "occupied"
-    """What unknown cells count as: ``occupied`` or ``free``."""
-    resolution: float | None = None
-    """Side of a cell [m]; None where the map's file tells it."""
-
-
 def read_parts(data: object, folder: Path, report: Report) -> dict[str, Any]:
     """Parts of a scenario as far as they can be read.
 
@@ -65,12 +50,12 @@ def read_parts(data: object, folder: Path, report: Report) -> dict[str, Any]:
     found = read_partial(data, "", SCENARIO, report)
     obstacles: list[Obstacle] = found.pop("obstacles", [])
     bounds: Bounds | None = found.pop("bounds", None)
-    if map_keys := found.pop("map", None):
-        file = folder / map_keys.pop("file")
-        map_bounds, map_obstacles = _load_map(file, report, **map_keys)
-        bounds = bounds or map_bounds
-        found["map"] = MapSource(file.resolve(), len(map_obstacles), **map_keys)
-        obstacles = map_obstacles + obstacles
+    if layers := found.pop("map", None):
+        loaded = load_layers(layers, folder, report)
+        if loaded is not None:
+            found["map"], map_bounds, map_obstacles = loaded
+            bounds = bounds or map_bounds
+            obstacles = map_obstacles + obstacles
     elif isinstance(data, Mapping) and not {"bounds", "map"} & data.keys():
         report.add("bounds", MISSING, "the corners {min: [x, y], max: [x, y]} [m], or a map")
     if bounds is not None:
@@ -95,8 +80,7 @@ def scenario_data(scenario: Scenario, folder: Path) -> dict[str, Any]:
         "obstacles": [_obstacle_data(o) for o in world.obstacles[source.obstacles if source else 0 :]],
     }
     if source is not None:
-        resolution = {} if source.resolution is None else {"resolution": float(source.resolution)}
-        data["map"] = {"file": _relative(source.file, folder), "unknown": source.unknown, **resolution}
+        data["map"] = source_data(source, folder)
     return data | {
         "robot": _robot_data(scenario.robot),
         "start": {name: float(value) for name, value in scenario.start._asdict().items()},
@@ -143,29 +127,6 @@ def _shape(value: object, path: str, keys: Mapping[str, Key], report: Report) ->
     """The values of a shape, without its type."""
     values = read_section(value, path, {"type": Key(text), **keys}, report)
     return values and {name: value for name, value in values.items() if name != "type"}
-
-
-def _map(value: object, path: str, report: Report) -> dict[str, Any] | None:
-    section = {"file": value} if isinstance(value, str) else value
-    values = read_section(section, path, MAP, report)
-    return values and {"unknown": "occupied", **values}
-
-
-def _load_map(
-    file: Path, report: Report, unknown: str, resolution: float | None = None
-) -> tuple[Bounds | None, list[Obstacle]]:
-    """Bounds and obstacles of a map; none where it cannot be read."""
-    from cbrrt_ompl.scenario.maps.loading import load_map
-
-    try:
-        loaded = load_map(file, resolution=resolution)
-        return loaded.bounds(), loaded.obstacles(unknown)
-    except InputError as error:
-        where = f"map: {error.source}" if error.source else "map"
-        report.adopt(
-            [Problem(f"{where}: {p.field}" if p.field else where, p.value, p.expected) for p in error.problems]
-        )
-        return None, []
 
 
 def _limits(value: object, path: str, report: Report) -> dict[str, Any] | None:
@@ -234,11 +195,6 @@ FOOTPRINTS: dict[str, dict[str, Key]] = {
     "disc": {"radius": Key(number, required="a radius of 0 or more [m]")},
     "polygon": {"vertices": Key(_corners, required="a list of corners [[x, y], ...] [m] in the robot's frame")},
 }
-MAP = {
-    "file": Key(text, required="the name of a map's file"),
-    "unknown": Key(one_of(UNKNOWN_CELLS)),
-    "resolution": Key(number),
-}
 LIMITS = {
     "v": Key(_range),
     "omega": Key(_range, is_angle=True),
@@ -283,7 +239,7 @@ SCENARIO = {
     "name": Key(text, required="one line of text"),
     "bounds": Key(_bounds),
     "obstacles": Key(list_of(obstacle, "a list of obstacles")),
-    "map": Key(_map),
+    "map": Key(map_layers),
     "robot": Key(_robot),
     "start": Key(_start, required="the state to start in, {x: 0.0, y: 0.0, theta: 0.0} [m, m, rad]"),
     "goal": Key(_goal, required="the goal region, {x: 0.0, y: 0.0, tolerance: 0.5} [m]"),
@@ -354,11 +310,3 @@ def _planning_data(planning: PlanningSettings) -> dict[str, Any]:
 
 def _floats(values: tuple[float, float]) -> list[float]:
     return [float(value) for value in values]
-
-
-def _relative(file: Path, folder: Path) -> str:
-    """A file's path as seen from a folder, with forward slashes."""
-    try:
-        return Path(os.path.relpath(file, folder)).as_posix()
-    except ValueError:  # another drive
-        return file.as_posix()
