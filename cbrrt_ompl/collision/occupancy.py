@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Integral
 
 import numpy as np
 from numba import njit
@@ -85,6 +86,46 @@ def cells_from(
     cells = np.full(values.shape, UNKNOWN, dtype=np.int8)
     cells[values > scale * occupied_thresh] = OCCUPIED
     cells[(values < scale * free_thresh) & (values >= 0)] = FREE
+    return cells
+
+
+def cells_from_costs(costs: ArrayLike, lethal_threshold: int | None = None) -> NDArray[np.int8]:
+    """Cells of a Nav2 costmap or of a ROS OccupancyGrid; see :meth:`World.from_costmap`.
+
+    Args:
+        costs: whole numbers, shape (rows, columns): 0 to 254 in a costmap, 0 to 100 in an OccupancyGrid; 255 and -1 are
+            unknown.
+        lethal_threshold: what is occupied, with all above it; 254 or 100 if not given.
+
+    Returns:
+        ``UNKNOWN``, ``FREE`` or ``OCCUPIED``, shape (rows, columns).
+
+    Raises:
+        MapError: if these are no such values.
+    """
+    try:
+        values = np.asarray(costs)
+    except ValueError:  # rows of different lengths
+        raise MapError(Problem("costs", costs, "cells in rows and columns")) from None
+    if values.ndim != 2 or values.size == 0:
+        raise MapError(Problem("costs", Remark(f"the shape {values.shape}"), "cells in rows and columns"))
+    if values.dtype.kind not in "iu":
+        expected = "whole numbers: a costmap (0 to 254, 255 unknown) or an OccupancyGrid (0 to 100, -1 unknown)"
+        raise MapError(Problem("costs", Remark(f"values of type {values.dtype}"), expected))
+    check_cell_count(values.shape, "costs")
+    low, high = int(values.min()), int(values.max())
+    if low < -1 or high > 255:
+        expected = "0 to 254 (a costmap) or 0 to 100 (an OccupancyGrid), and 255 or -1 where unknown"
+        raise MapError(Problem("costs", Remark(f"values from {low} to {high}"), expected))
+    is_costmap = ((values > 100) & (values < 255)).any()
+    lethal = 254 if is_costmap else 100
+    if lethal_threshold is not None:
+        is_whole = isinstance(lethal_threshold, Integral) and not isinstance(lethal_threshold, bool)
+        if not is_whole or not 1 <= lethal_threshold <= lethal:
+            raise MapError(Problem("lethal_threshold", lethal_threshold, f"a whole number from 1 to {lethal}"))
+        lethal = lethal_threshold
+    cells = np.where(values >= lethal, OCCUPIED, FREE).astype(np.int8)
+    cells[(values == 255) | (values == -1)] = UNKNOWN
     return cells
 
 
