@@ -21,7 +21,7 @@ import cbrrt_ompl
 from cbrrt_ompl.cli import build_parser
 from cbrrt_ompl.problem.robot import Gains, Limits
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
-from cbrrt_ompl.scenario import map_layers, scenario_file
+from cbrrt_ompl.scenario import footprints, map_layers, scenario_file
 from cbrrt_ompl.scenario.scenario import load_scenario
 from cbrrt_ompl.scenario.sections import Key
 
@@ -30,7 +30,7 @@ SECTIONS: dict[str, Mapping[str, Key]] = {
     **scenario_file.OBSTACLES,
     "map": map_layers.MAP,
     "robot": scenario_file.ROBOT,
-    "robot.footprint": {name: key for keys in scenario_file.FOOTPRINTS.values() for name, key in keys.items()},
+    "robot.footprint": {name: key for keys in footprints.FOOTPRINTS.values() for name, key in keys.items()},
     "robot.limits": scenario_file.LIMITS,
     "robot.gains": scenario_file.GAINS,
     "start": scenario_file.START,

@@ -675,6 +675,27 @@ def test_a_dynobench_robot_may_be_kept_from_reversing(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
+        (
+            "dt:",
+            'dynamics: "unicycle1"\ndt:',
+            "dynamics: got the robot unicycle1, expected unicycle2, the second-order",
+        ),
+        ("dt:", "dynamics: car1_v0\ndt:", "dynamics: got the robot car1_v0"),
+        ("min_vel: -0.5", "min_vel: 0.25", "min_vel: got 0.25, expected 0 or less: a robot that cannot stand still"),
+        ("type: unicycle2_v0", "type: unicycle1_v0", "robots[0].type: got the robot unicycle1_v0, expected unicycle2"),
+        ("robots:", "robots: [{}, {}]\nothers:", "robots: got 2 robots, expected a list of one robot"),
+    ],
+)
+def test_dynobench_problems_of_other_kinds_are_refused_by_name(tmp_path: Path, old: str, new: str, words: str) -> None:
+    assert old in PROBLEM or old in MODEL
+    with pytest.raises(MapError) as caught:
+        load_dynobench(*dynobench_files(tmp_path, PROBLEM.replace(old, new), MODEL.replace(old, new)))
+    assert words in one_line(caught)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
         ("max_vel: 0.5", "", "model.yaml: max_vel: missing"),
         ("size: [0.5, 0.25]", "size: [0.5]", "model.yaml: size: got [0.5]"),
         ("dt: 0.1", "dt: 0", "model.yaml: dt: got 0"),

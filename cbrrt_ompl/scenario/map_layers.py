@@ -11,7 +11,7 @@ from typing import Any
 from cbrrt_ompl.collision.occupancy import OCCUPIED, UNKNOWN_CELLS, GridLayer
 from cbrrt_ompl.errors import InputError, Problem
 from cbrrt_ompl.problem.obstacles import Bounds, Obstacle
-from cbrrt_ompl.scenario.maps.image_files import as_written
+from cbrrt_ompl.scenario.maps.map_files import as_written
 from cbrrt_ompl.scenario.sections import Key, Report, number, one_of, read_section, text
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 
 from cbrrt_ompl.checks import A_NUMBER, LARGEST, is_number
 from cbrrt_ompl.collision.world import World
-from cbrrt_ompl.errors import MISSING, InputError, Problem, Remark, ScenarioError
+from cbrrt_ompl.errors import Problem, Remark, ScenarioError
 from cbrrt_ompl.files import as_path, write_file
 from cbrrt_ompl.problem.robot import Limits, Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
@@ -82,7 +81,8 @@ def load_scenario(path: str | Path) -> Scenario:
     """Scenario from a YAML file.
 
     Args:
-        path: the file; or the name of a scenario that comes with the package, where there is no such file.
+        path: the file; or the name of a scenario that comes with the package, where there is no such file; or a problem
+            of a MovingAI benchmark, ``arena.map.scen:12`` for the twelfth.
 
     Returns:
         The scenario, checked.
@@ -90,35 +90,10 @@ def load_scenario(path: str | Path) -> Scenario:
     Raises:
         ScenarioError: with every mistake in the file, one line each.
     """
-    from cbrrt_ompl.scenario.plain_yaml import read_yaml
+    from cbrrt_ompl.scenario.sources import read_source
 
-    path = as_path(path, ScenarioError)
-    if not (path.suffix or path.parent.name or os.path.exists(path)):
-        path = scenario_path(path.name)
     report = Report()
-    try:
-        data = read_yaml(path, report.problems)
-    except InputError as error:
-        raise ScenarioError(error.problems, str(path)) from None
-    return _make(data, str(path), path.parent, report)
-
-
-def scenario_path(name: str) -> Path:
-    """The file of a scenario that comes with the package, in a checkout or in an installed wheel.
-
-    Args:
-        name: name of the file without its suffix.
-
-    Raises:
-        ScenarioError: if there is no such file, with the names that there are.
-    """
-    package = Path(__file__).resolve().parent.parent
-    files = [file for folder in (package, package.parent) for file in (folder / "scenarios").glob("*.yaml")]
-    found = {file.stem: file for file in sorted(files)}
-    if name not in found:
-        expected = f"a scenario file, or one of those that come along: {', '.join(found)}"
-        raise ScenarioError(Problem("", MISSING, expected), name)
-    return found[name]
+    return _make(*read_source(as_path(path, ScenarioError), report), report)
 
 
 def save_scenario(scenario: Scenario, path: str | Path) -> None:

@@ -13,20 +13,24 @@ from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import MISSING
 from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, Obstacle, OrientedBox, Polygon
 from cbrrt_ompl.problem.ready_robots import ROBOTS
-from cbrrt_ompl.problem.robot import Footprint, Gains, Limits, Robot
+from cbrrt_ompl.problem.robot import Gains, Limits, Robot
 from cbrrt_ompl.problem.settings import CUT_EXTENSION, NEAREST_NEIGHBOUR, Goal, PlanningSettings, State
+from cbrrt_ompl.scenario.footprints import disc, footprint
 from cbrrt_ompl.scenario.map_layers import load_layers, map_layers, source_data
+from cbrrt_ompl.scenario.nav2 import FOREIGN_KEYS, Nav2Robot, nav2_robot
 from cbrrt_ompl.scenario.sections import (
     Key,
     Report,
     build,
     flag,
+    kind_of,
     list_of,
     number,
     one_of,
     pair_of,
     read_partial,
     read_section,
+    shape_of,
     text,
     whole_number,
 )
@@ -46,7 +50,7 @@ def read_parts(data: object, folder: Path, report: Report) -> dict[str, Any]:
     Returns:
         The attributes of a scenario that were given and right; the world also where single obstacles are wrong.
     """
-    report.homes = HOMES
+    report.homes, report.foreign, report.folder = HOMES, FOREIGN_KEYS, folder
     found = read_partial(data, "", SCENARIO, report)
     obstacles: list[Obstacle] = found.pop("obstacles", [])
     bounds: Bounds | None = found.pop("bounds", None)
@@ -104,29 +108,8 @@ def _bounds(value: object, path: str, report: Report) -> Bounds | None:
 def obstacle(value: object, path: str, report: Report) -> Obstacle | None:
     """An obstacle of any type."""
     kinds: dict[str, type] = {"box": Box, "oriented_box": OrientedBox, "disc": Disc, "polygon": Polygon}
-    kind = _kind(value, path, OBSTACLES, report)
-    return None if kind is None else build(kinds[kind], _shape(value, path, OBSTACLES[kind], report), path, report)
-
-
-def _footprint(value: object, path: str, report: Report) -> Footprint | None:
-    makers = {"disc": Footprint.disc, "polygon": Footprint.polygon}
-    kind = _kind(value, path, FOOTPRINTS, report)
-    return None if kind is None else build(makers[kind], _shape(value, path, FOOTPRINTS[kind], report), path, report)
-
-
-def _kind(value: object, path: str, kinds: Mapping[str, Mapping[str, Key]], report: Report) -> str | None:
-    """The type of a shape."""
-    if not isinstance(value, Mapping):
-        report.add(path, value, f"a mapping with a type: {', '.join(kinds)}")
-        return None
-    kind: str | None = one_of(list(kinds))(value.get("type", MISSING), f"{path}.type", report)
-    return kind
-
-
-def _shape(value: object, path: str, keys: Mapping[str, Key], report: Report) -> dict[str, Any] | None:
-    """The values of a shape, without its type."""
-    values = read_section(value, path, {"type": Key(text), **keys}, report)
-    return values and {name: value for name, value in values.items() if name != "type"}
+    kind = kind_of(value, path, OBSTACLES, report)
+    return None if kind is None else build(kinds[kind], shape_of(value, path, OBSTACLES[kind], report), path, report)
 
 
 def _limits(value: object, path: str, report: Report) -> dict[str, Any] | None:
@@ -150,13 +133,22 @@ def _model(value: object, path: str, report: Report) -> Robot | None:
 
 
 def _robot(value: object, path: str, report: Report) -> Robot | None:
-    """A ready robot by its name; or one described in full, or by what differs from a ready one."""
+    """A ready robot by its name; or one described in full, or by what differs from a ready one or from Nav2's."""
     if isinstance(value, str):
         return _model(value, path, report)
     values = read_section(value, path, ROBOT, report)
-    if values is None:
+    if values is None or not isinstance(value, Mapping):
         return None
     model = values.pop("model", Robot())
+    nav2: Nav2Robot | None = values.pop("nav2", None)
+    if nav2 is not None:
+        model = nav2.over(model)
+        report.defaults["goal"] = nav2.goal
+    if "robot_radius" in values:
+        if "footprint" in values:
+            report.add(f"{path}.robot_radius", value["robot_radius"], "either footprint or robot_radius")
+            return None
+        values["footprint"] = values.pop("robot_radius")
     for part in {"limits", "gains"} & values.keys():
         values[part] = getattr(model, part)._replace(**values[part])
     return build(partial(replace, model), values, path, report)
@@ -168,6 +160,9 @@ def _start(value: object, path: str, report: Report) -> State | None:
 
 def _goal(value: object, path: str, report: Report) -> Goal | None:
     values = read_section(value, path, GOAL, report)
+    if values is not None:
+        usual = report.defaults.get("goal", {})
+        values = {name: usual[name] for name in usual if name == "tolerance" or "theta" in values} | values
     if values is not None and "heading_tolerance" in values and "theta" not in values:
         report.add(f"{path}.theta", MISSING, f"the heading that {path}.heading_tolerance is about [rad]")
         return None
@@ -191,10 +186,6 @@ OBSTACLES: dict[str, dict[str, Key]] = {
         "holes": Key(list_of(_corners, "a list of rings, each a list of corners")),
     },
 }
-FOOTPRINTS: dict[str, dict[str, Key]] = {
-    "disc": {"radius": Key(number, required="a radius of 0 or more [m]")},
-    "polygon": {"vertices": Key(_corners, required="a list of corners [[x, y], ...] [m] in the robot's frame")},
-}
 LIMITS = {
     "v": Key(_range),
     "omega": Key(_range, is_angle=True),
@@ -205,7 +196,14 @@ LIMITS = {
     "wheel_acceleration": Key(number),
 }
 GAINS = {name: Key(number) for name in Gains._fields}
-ROBOT = {"model": Key(_model), "footprint": Key(_footprint), "limits": Key(_limits), "gains": Key(_gains)}
+ROBOT = {
+    "model": Key(_model),
+    "nav2": Key(nav2_robot),
+    "footprint": Key(footprint),
+    "robot_radius": Key(disc),
+    "limits": Key(_limits),
+    "gains": Key(_gains),
+}
 START = {
     "x": _x,
     "y": _y,

@@ -9,13 +9,10 @@ from cbrrt_ompl.collision.occupancy import OCCUPIED
 from cbrrt_ompl.errors import MISSING, MapError, Problem, Remark
 from cbrrt_ompl.files import as_path
 from cbrrt_ompl.scenario.maps.image import read_image
-from cbrrt_ompl.scenario.maps.image_files import IMAGE_SUFFIXES
+from cbrrt_ompl.scenario.maps.map_files import IMAGE_SUFFIXES, MOVINGAI_SUFFIX, ROS_SUFFIXES
 from cbrrt_ompl.scenario.maps.map_server import read_map_server
 from cbrrt_ompl.scenario.maps.movingai import read_movingai
 from cbrrt_ompl.scenario.maps.occupancy_map import OccupancyMap
-
-ROS_SUFFIXES = (".yaml", ".yml")
-MOVINGAI_SUFFIX = ".map"
 
 
 def load_map(

@@ -1,12 +1,17 @@
-"""Files that maps name: images, and where they are looked for."""
+"""Files of maps: what their names end in, what is in them, and where the files that they name are looked for."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
 
+ROS_SUFFIXES = (".yaml", ".yml")
+MOVINGAI_SUFFIX = ".map"
 IMAGE_SUFFIXES = (".bmp", ".gif", ".jpeg", ".jpg", ".pbm", ".pgm", ".png", ".ppm", ".tif", ".tiff")
-"""What the names of images end in."""
+"""What the names of maps end in, by their kind."""
+
+MAP_SERVER_KEYS = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
+"""Keys of a map_server file, by which it is told from other YAML files."""
 
 
 def find_beside(name: str, folder: Path) -> tuple[Path | None, str]:

@@ -16,7 +16,7 @@ from cbrrt_ompl.collision.occupancy import FREE, FREE_THRESHOLD, OCCUPIED, OCCUP
 from cbrrt_ompl.errors import MISSING, InputError, MapError, Problem
 from cbrrt_ompl.files import write_files
 from cbrrt_ompl.scenario.maps.image import MODES, UNKNOWN_GREY, Reading, cells_of
-from cbrrt_ompl.scenario.maps.image_files import IMAGE_SUFFIXES, find_beside
+from cbrrt_ompl.scenario.maps.map_files import IMAGE_SUFFIXES, find_beside
 from cbrrt_ompl.scenario.maps.pixels import read_pixels
 from cbrrt_ompl.scenario.plain_yaml import dump_line, read_yaml
 
@@ -25,10 +25,6 @@ if TYPE_CHECKING:
 
 _GREYS = {OCCUPIED: 0, FREE: 254, UNKNOWN: UNKNOWN_GREY}
 """What map_saver writes."""
-
-
-MAP_KEYS = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
-"""Keys of a map_server file, by which one is told from other YAML files."""
 
 
 class MapServerMap(NamedTuple):
