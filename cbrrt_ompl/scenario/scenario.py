@@ -16,6 +16,7 @@ from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.scenario.map_layers import MapSource
 from cbrrt_ompl.scenario.scenario_file import read_parts, scenario_data
 from cbrrt_ompl.scenario.sections import Report
+from cbrrt_ompl.scenario.sources import Source, read_source
 
 HORIZON_TOLERANCE = 0.01
 """Share of the horizon that rounding it to whole steps may add or take away."""
@@ -90,10 +91,8 @@ def load_scenario(path: str | Path) -> Scenario:
     Raises:
         ScenarioError: with every mistake in the file, one line each.
     """
-    from cbrrt_ompl.scenario.sources import read_source
-
     report = Report()
-    return _make(*read_source(as_path(path, ScenarioError), report), report)
+    return make_scenario(read_source(as_path(path, ScenarioError), report), report)
 
 
 def save_scenario(scenario: Scenario, path: str | Path) -> None:
@@ -135,7 +134,8 @@ def scenario_from_dict(data: Mapping[str, Any], source: str = "scenario", folder
     Raises:
         ScenarioError: with every mistake in the values, one line each.
     """
-    return _make(data, source, Path() if folder is None else as_path(folder, ScenarioError), Report())
+    where = Path() if folder is None else as_path(folder, ScenarioError)
+    return make_scenario(Source(data, source, where), Report())
 
 
 def scenario_to_dict(scenario: Scenario, folder: Path | None = None) -> dict[str, Any]:
@@ -175,15 +175,29 @@ def find_problems(parts: Mapping[str, Any]) -> list[Problem]:
     return found
 
 
-def _make(data: object, source: str, folder: Path, report: Report) -> Scenario:
-    """Scenario from plain values, or every mistake in them and in what they add up to."""
-    parts = read_parts(data, folder, report)
-    if isinstance(data, Mapping):
-        defaults = {"robot": Robot(), "planning": PlanningSettings()}
-        report.adopt(find_problems({**{k: v for k, v in defaults.items() if k not in data}, **parts}))
+def make_scenario(source: Source, report: Report) -> Scenario:
+    """Scenario from plain values.
+
+    Args:
+        source: what was read.
+        report: with the mistakes of reading it.
+
+    Raises:
+        ScenarioError: with every mistake in the values and in what they add up to.
+    """
+    parts = read_checked(source, report)
     if report.problems:
-        raise ScenarioError(report.problems, source)
+        raise ScenarioError(report.problems, source.name)
     return Scenario(**parts)
+
+
+def read_checked(source: Source, report: Report) -> dict[str, Any]:
+    """Parts of a scenario as far as they can be read, and in the report every mistake in them and in their sum."""
+    parts = read_parts(source.data, source.folder, report)
+    if isinstance(source.data, Mapping):
+        defaults = {"robot": Robot(), "planning": PlanningSettings()}
+        report.adopt(find_problems({**{k: v for k, v in defaults.items() if k not in source.data}, **parts}))
+    return parts
 
 
 def _check_types(scenario: Scenario) -> None:

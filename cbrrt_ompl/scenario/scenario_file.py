@@ -86,7 +86,7 @@ def scenario_data(scenario: Scenario, folder: Path) -> dict[str, Any]:
     if source is not None:
         data["map"] = source_data(source, folder)
     return data | {
-        "robot": _robot_data(scenario.robot),
+        "robot": robot_data(scenario.robot),
         "start": {name: float(value) for name, value in scenario.start._asdict().items()},
         "goal": _goal_data(scenario.goal),
         "planning": _planning_data(scenario.planning),
@@ -270,7 +270,8 @@ def _obstacle_data(obstacle: Obstacle) -> dict[str, Any]:
     return {"type": "polygon", "vertices": obstacle.vertices.tolist(), **holes}
 
 
-def _robot_data(robot: Robot) -> dict[str, Any]:
+def robot_data(robot: Robot) -> dict[str, Any]:
+    """Plain value of a robot, in full."""
     footprint, limits = robot.footprint, robot.limits
     return {
         "footprint": {"type": "disc", "radius": float(footprint.radius)}

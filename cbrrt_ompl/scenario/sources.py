@@ -75,6 +75,11 @@ def is_map(path: Path) -> bool:
         return False
 
 
+def has_no_scale(path: Path) -> bool:
+    """Whether a map does not tell the size of its cells: all but those of map_server."""
+    return _is_map_by_suffix(path)
+
+
 def _is_map_by_suffix(path: Path) -> bool:
     return path.suffix.lower() in (MOVINGAI_SUFFIX, *IMAGE_SUFFIXES)
 
