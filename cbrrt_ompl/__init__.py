@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from cbrrt_ompl.problem.robot import Footprint, Gains, Limits, Robot
     from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
     from cbrrt_ompl.scenario.scenario import Scenario, load_scenario, save_scenario
+    from cbrrt_ompl.trajectory.foreign import load_track
+    from cbrrt_ompl.trajectory.track import Track
     from cbrrt_ompl.trajectory.trajectory import Trajectory
     from cbrrt_ompl.verification import verify
 
@@ -43,12 +45,14 @@ __all__ = [
     "Robot",
     "Scenario",
     "State",
+    "Track",
     "Trajectory",
     "World",
     "__version__",
     "load_dynobench",
     "load_map",
     "load_scenario",
+    "load_track",
     "make_setup",
     "plan",
     "save_map",
@@ -67,6 +71,8 @@ _MODULES = {
     "problem.settings": ("Goal", "PlanningSettings", "State"),
     "maps": ("OccupancyMap", "load_dynobench", "load_map", "save_map"),
     "scenario.scenario": ("Scenario", "load_scenario", "save_scenario"),
+    "trajectory.foreign": ("load_track",),
+    "trajectory.track": ("Track",),
     "trajectory.trajectory": ("Trajectory",),
     "verification": ("verify",),
 }

@@ -141,7 +141,7 @@ def test_the_scenario_on_the_scenario_page_can_be_loaded(docs: Path, tmp_path: P
     assert len(load_scenario(path).world.obstacles) == 4
 
 
-@pytest.mark.parametrize("page", ["getting-started.md", "own-map.md", "faq.md"])
+@pytest.mark.parametrize("page", ["getting-started.md", "own-map.md", "robot.md", "faq.md"])
 def test_the_python_on_the_pages_runs(repository: Path, docs: Path, tmp_path: Path, page: str) -> None:
     code = "\n".join(blocks((docs / page).read_text(encoding="utf-8"), "python"))
     environment = {**os.environ, "PYTHONPATH": str(repository)}
@@ -149,9 +149,12 @@ def test_the_python_on_the_pages_runs(repository: Path, docs: Path, tmp_path: Pa
         [sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120
     )
     assert done.returncode == 0, done.stderr
-    assert {"getting-started.md": "Exact solution", "own-map.md": "solved", "faq.md": "1 sampler made"}[
-        page
-    ] in done.stdout
+    assert {
+        "getting-started.md": "Exact solution",
+        "own-map.md": "solved",
+        "robot.md": ".",
+        "faq.md": "1 sampler made",
+    }[page] in done.stdout
 
 
 def test_the_citation_has_the_version_of_the_project(repository: Path) -> None:

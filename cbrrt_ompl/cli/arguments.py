@@ -106,6 +106,11 @@ def metres(text: str) -> float:
     return _above_zero(text, "metres")
 
 
+def tolerance(text: str) -> float:
+    """A deviation from the command line."""
+    return _above_zero(text, "metres and radians")
+
+
 def count(text: str) -> int:
     """A number of things from the command line."""
     return _whole(text, 1)
