@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from cbrrt_ompl.collision.world import World
     from cbrrt_ompl.errors import CbrrtError, InputError
+    from cbrrt_ompl.export.following import follow
     from cbrrt_ompl.maps import OccupancyMap, load_dynobench, load_map, save_map
     from cbrrt_ompl.ompl_plugin.setup import make_setup
     from cbrrt_ompl.planning import PlanResult, plan
@@ -49,6 +50,7 @@ __all__ = [
     "Trajectory",
     "World",
     "__version__",
+    "follow",
     "load_dynobench",
     "load_map",
     "load_scenario",
@@ -63,6 +65,7 @@ __all__ = [
 _MODULES = {
     "collision.world": ("World",),
     "errors": ("CbrrtError", "InputError"),
+    "export.following": ("follow",),
     "ompl_plugin.setup": ("make_setup",),
     "planning": ("PlanResult", "plan"),
     "problem.obstacles": ("Bounds", "Box", "Disc", "OrientedBox", "Polygon"),

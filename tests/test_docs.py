@@ -152,7 +152,7 @@ def test_the_python_on_the_pages_runs(repository: Path, docs: Path, tmp_path: Pa
     assert {
         "getting-started.md": "Exact solution",
         "own-map.md": "solved",
-        "robot.md": ".",
+        "robot.md": " poses",
         "faq.md": "1 sampler made",
     }[page] in done.stdout
 

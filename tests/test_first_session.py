@@ -17,7 +17,7 @@ from cbrrt_ompl.cli.problem import REST_SPEED, map_planner
 from cbrrt_ompl.errors import ScenarioError
 from cbrrt_ompl.figures.maps import WRONG_COLOR, draw_draft, draw_map
 from cbrrt_ompl.maps import load_map
-from cbrrt_ompl.planning import PLANNERS
+from cbrrt_ompl.planners.registry import PLANNERS
 from cbrrt_ompl.scenario.draft import load_draft
 from cbrrt_ompl.scenario.maps.free_places import places_apart
 from cbrrt_ompl.scenario.scenario import load_scenario

@@ -39,7 +39,7 @@ MAP_PLANNERS = ("cb-rrt-anytime", "cb-rrt-robust")
 
 def map_planner() -> str:
     """The planner for maps where none is named."""
-    from cbrrt_ompl.planning import PLANNERS
+    from cbrrt_ompl.planners.registry import PLANNERS
 
     return next(name for name in MAP_PLANNERS if name in PLANNERS)
 
