@@ -432,7 +432,11 @@ MISTAKES = {
 
 @pytest.mark.parametrize(("old", "new", "complaint"), MISTAKES.values(), ids=MISTAKES)
 def test_a_mistake_is_one_line_that_names_it(tmp_path: Path, old: str, new: str, complaint: str) -> None:
-    assert complaints(tmp_path, changed(old, new)) == [complaint]
+    (line,) = complaints(tmp_path, changed(old, new))
+    if complaint.endswith(("and no bound", "in collision")):
+        assert line.startswith(complaint)  # and then comes what is there
+    else:
+        assert line == complaint
 
 
 def test_a_polygon_that_crosses_itself_is_named_with_the_place(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from cbrrt_ompl.scenario.map_layers import MapSource
 from cbrrt_ompl.scenario.scenario_file import read_parts, scenario_data
 from cbrrt_ompl.scenario.sections import Report
 from cbrrt_ompl.scenario.sources import Source, read_source
+from cbrrt_ompl.scenario.why_not import why_not
 
 HORIZON_TOLERANCE = 0.01
 """Share of the horizon that rounding it to whole steps may add or take away."""
@@ -167,9 +168,9 @@ def find_problems(parts: Mapping[str, Any]) -> list[Problem]:
     if robot is not None and world is not None:
         found += _footprint_problems(robot, world)
     if start is not None:
-        found += _start_problems(start, world, robot)
+        found += _start_problems(start, world, robot, parts.get("map"))
     if goal is not None and world is not None:
-        found += _goal_problems(goal, world, robot)
+        found += _goal_problems(goal, world, robot, parts.get("map"))
     if planning is not None:
         found += _horizon_problems(planning)
     return found
@@ -227,7 +228,9 @@ def _footprint_problems(robot: Robot, world: World) -> Iterator[Problem]:
         yield Problem("robot.footprint", Remark(f"one {distance:g} m away"), expected)
 
 
-def _start_problems(start: State, world: World | None, robot: Robot | None) -> Iterator[Problem]:
+def _start_problems(
+    start: State, world: World | None, robot: Robot | None, source: MapSource | None
+) -> Iterator[Problem]:
     """Why the robot cannot start from a state."""
     infinite = [name for name, value in start._asdict().items() if not is_number(value, LARGEST)]
     yield from (Problem(f"start.{name}", getattr(start, name), A_NUMBER) for name in infinite)
@@ -240,7 +243,9 @@ def _start_problems(start: State, world: World | None, robot: Robot | None) -> I
     if not world.bounds.contains(start.x, start.y):
         yield Problem("start", [start.x, start.y], _inside(world))
     elif robot is not None and world.collides(robot.footprint, start[:3]):
-        yield Problem("start", list(start[:3]), "a pose where the footprint touches no obstacle and no bound")
+        reason = why_not(world, robot.footprint, start[:3], source)
+        expected = f"a pose where the footprint touches no obstacle and no bound: {reason}"
+        yield Problem("start", list(start[:3]), expected)
 
 
 def _inside(world: World) -> str:
@@ -262,12 +267,14 @@ def _velocity_problems(start: State, limits: Limits) -> Iterator[Problem]:
         yield Problem("start", {"v": start.v, "omega": start.omega}, expected)
 
 
-def _goal_problems(goal: Goal, world: World, robot: Robot | None) -> Iterator[Problem]:
+def _goal_problems(goal: Goal, world: World, robot: Robot | None, source: MapSource | None) -> Iterator[Problem]:
     """Why no state of the goal region can be reached."""
     if not world.bounds.contains(goal.x, goal.y):
         yield Problem("goal", [goal.x, goal.y], _inside(world))
     elif robot is not None and not _may_be_free(goal, world, robot):
-        yield Problem("goal", [goal.x, goal.y], "a region with room for the robot: all of it is in collision")
+        reason = why_not(world, robot.footprint, (goal.x, goal.y, goal.theta or 0.0), source)
+        expected = f"a region with room for the robot: all of it is in collision; at its centre {reason}"
+        yield Problem("goal", [goal.x, goal.y], expected)
 
 
 def _may_be_free(goal: Goal, world: World, robot: Robot) -> bool:
