@@ -49,6 +49,30 @@ def why_not(world: World, footprint: Footprint, pose: Sequence[float], source: M
     return f"{found}; the nearest free pose is about ({x:.2f}, {y:.2f}, {theta:.3g}), {away:.2g} m away"
 
 
+def nearest_thing(world: World, footprint: Footprint, pose: Sequence[float], known: int) -> str:
+    """The obstacle or wall that is nearest to a robot at a pose, and how far away it is.
+
+    Args:
+        world: bounds and obstacles.
+        footprint: the robot's area.
+        pose: (x, y, theta) [m, m, rad].
+        known: how many of the obstacles are the scenario's; those behind them were hidden.
+    """
+    area: Any = shapely.Point(pose[0], pose[1])
+    if footprint.kind != "point":
+        area = shapely.Polygon(footprint.outline_at(pose, _SEGMENTS))
+    (x0, y0), (x1, y1) = world.bounds.min, world.bounds.max
+    a0, b0, a1, b1 = area.bounds
+    found, name = min(a0 - x0, b0 - y0, x1 - a1, y1 - b1), "the bounds"
+    for i, obstacle in enumerate(world.obstacles):
+        if _meets(obstacle, a0 - found, b0 - found, a1 + found, b1 + found):
+            distance = float(shapely.distance(area, _shape(obstacle)))
+            if distance < found:
+                number = f"obstacles[{i}]" if i < known else f"hidden obstacle {i - known}"
+                found, name = distance, f"{number}, a {type(obstacle).__name__.lower()}"
+    return f"{name}, {max(found, 0.0):.2g} m away"
+
+
 def _what_is_there(world: World, area: Any, source: MapSource | None) -> str:
     """The unknown cells, the wall or the obstacle that an area touches, and how deep."""
     from_map = 0 if source is None else source.obstacles
