@@ -13,6 +13,7 @@ from cbrrt_ompl.one_libompl import load_one_libompl
 if TYPE_CHECKING:
     from cbrrt_ompl.collision.world import World
     from cbrrt_ompl.errors import CbrrtError, InputError, OmplMissingError
+    from cbrrt_ompl.export.following import follow
     from cbrrt_ompl.maps import OccupancyMap, load_dynobench, load_map, save_map
     from cbrrt_ompl.motion.laws import register_law
     from cbrrt_ompl.ompl_plugin.own_sampler import with_directed_sampler
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
     from cbrrt_ompl.problem.robot import Footprint, Gains, Limits, Robot
     from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
     from cbrrt_ompl.scenario.scenario import Scenario, load_scenario, save_scenario
+    from cbrrt_ompl.trajectory.foreign import load_track
+    from cbrrt_ompl.trajectory.track import Track
     from cbrrt_ompl.trajectory.trajectory import Trajectory
     from cbrrt_ompl.verification import verify
 
@@ -56,14 +59,17 @@ __all__ = [
     "Scenario",
     "State",
     "SteeringDirectedControlSampler",
+    "Track",
     "Trajectory",
     "TwoWheelPropagator",
     "World",
     "__version__",
+    "follow",
     "load_dynobench",
     "load_map",
     "load_scenario",
     "make_control_space",
+    "load_track",
     "make_setup",
     "make_state_space",
     "plan",
@@ -85,6 +91,7 @@ _MODULES = {
     "ompl_plugin.propagators": ("TwoWheelPropagator",),
     "ompl_plugin.results": ("trajectory_from_path",),
     "ompl_plugin.samplers": ("KanayamaDirectedControlSampler", "SteeringDirectedControlSampler"),
+    "export.following": ("follow",),
     "ompl_plugin.setup": ("make_setup",),
     "ompl_plugin.space": ("make_control_space", "make_state_space", "read_state", "write_state"),
     "ompl_plugin.validity": ("FclStateValidityChecker",),
@@ -95,6 +102,8 @@ _MODULES = {
     "problem.settings": ("Goal", "PlanningSettings", "State"),
     "maps": ("OccupancyMap", "load_dynobench", "load_map", "save_map"),
     "scenario.scenario": ("Scenario", "load_scenario", "save_scenario"),
+    "trajectory.foreign": ("load_track",),
+    "trajectory.track": ("Track",),
     "trajectory.trajectory": ("Trajectory",),
     "verification": ("verify",),
 }

@@ -39,6 +39,24 @@ def write_file(path: Path, content: bytes | str, error: type[InputError] = Input
     write_files({path: content}, error)
 
 
+def write_new_file(path: Path, content: str) -> None:
+    """Write a file that must not exist.
+
+    Raises:
+        InputError: if it exists, or cannot be written.
+    """
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(content)
+    except FileExistsError:
+        raise InputError(
+            Problem("", Remark("a file that exists"), "a new one: none is overwritten"), str(path)
+        ) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(Problem("", Remark(reason), "a file that can be written"), str(path)) from None
+
+
 def write_files(contents: Mapping[Path, bytes | str], error: type[InputError] = InputError) -> None:
     """Write files that belong together: each beside the old one first, then all into their places.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from numbers import Integral
 from typing import Any
@@ -13,19 +13,26 @@ from typing import Any
 import numpy as np
 
 from cbrrt_ompl.checks import is_number
+from cbrrt_ompl.collision.free_poses import nearest_free_pose
 from cbrrt_ompl.errors import Problem, SettingsError
 from cbrrt_ompl.motion.model import check_step, make_model
 from cbrrt_ompl.ompl_plugin.availability import check_ompl, has_ompl
 from cbrrt_ompl.planners.registry import PLANNERS, is_compiled, law_of, planner_named
 from cbrrt_ompl.planners.search import Search
 from cbrrt_ompl.planners.warm_up import warm_up
+from cbrrt_ompl.problem.robot import Footprint
+from cbrrt_ompl.problem.settings import Goal
+from cbrrt_ompl.scenario.connectivity import has_no_way
 from cbrrt_ompl.scenario.scenario import Scenario, check_scenario
 from cbrrt_ompl.trajectory.replay import trajectory_from_controls
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.trajectory.tree import Tree
 
-SOLVED, TIME_LIMIT, SAMPLE_LIMIT = "solved", "time limit", "sample limit"
+SOLVED, TIME_LIMIT, SAMPLE_LIMIT, NO_WAY = "solved", "time limit", "sample limit", "no way"
 """How a plan ends."""
+
+PATIENCE = 0.5
+"""Planning time after which a plan looks for a proof that there is no way [s]."""
 
 PROGRESS_PERIOD = 0.1
 """Time between two reports of progress [s]."""
@@ -43,7 +50,7 @@ class PlanResult:
     seed: int | None
     """The seed that was asked for."""
     status: str
-    """``solved``, ``time limit`` or ``sample limit``."""
+    """``solved``, ``time limit``, ``sample limit``, or ``no way`` where that is proven."""
     trajectory: Trajectory | None
     """From the start into the goal region; None where not solved."""
     nodes: int
@@ -104,6 +111,9 @@ def plan(
     watch = _Watch(time_limit, progress)
     if not scenario.goal.violations(scenario.start):
         return _already_there(scenario, planner, seed)
+    watch.is_hopeless = lambda: has_no_way(scenario.world, scenario.robot.footprint, scenario.start, scenario.goal)
+    if scenario.planning.approaches(scenario.goal):
+        scenario = replace(scenario, goal=approachable_goal(scenario))
     if is_compiled(planner):
         return _plan_compiled(scenario, planner, seed, watch)
     return _plan_in_ompl(scenario, planner, seed, watch)
@@ -189,6 +199,32 @@ def _plan_in_ompl(scenario: Scenario, planner: str, seed: int | None, watch: _Wa
     )
 
 
+def approachable_goal(scenario: Scenario) -> Goal:
+    """The goal region of a final approach: where the robot does not fit its centre, a part about the nearest free pose.
+
+    Every state in it is in the goal region of the scenario.
+    """
+    goal, robot, room = scenario.goal, scenario.robot, max(scenario.planning.clearance, 5e-4) + 1e-3
+    centre = (goal.x, goal.y, 0.0 if goal.theta is None else goal.theta)
+    if scenario.world.clearance(robot.footprint, centre) > room:
+        return goal
+    most = 0.5 * goal.heading_tolerance if goal.theta is not None else math.pi
+    turns = (0.0, 0.5 * most, -0.5 * most, most, -most)
+    reach = 0.9 * goal.tolerance
+    around = Footprint.disc(robot.footprint.circumscribed_radius)  # with room to turn on the spot, if there is
+    found = nearest_free_pose(scenario.world, around, centre, reach, room=room)
+    found = found or nearest_free_pose(scenario.world, robot.footprint, centre, reach, turns, room)
+    if found is None:
+        return goal
+    x, y, theta = found
+    left = goal.tolerance - math.hypot(x - goal.x, y - goal.y)
+    if goal.theta is None:
+        return replace(goal, x=x, y=y, tolerance=left)
+    return replace(
+        goal, x=x, y=y, tolerance=left, theta=theta, heading_tolerance=goal.heading_tolerance - abs(theta - goal.theta)
+    )
+
+
 def _already_there(scenario: Scenario, planner: str, seed: int | None) -> PlanResult:
     """The plan of a robot that starts in its goal region: stay."""
     model = make_model(law_of(planner, scenario.planning), scenario.robot, scenario.goal, scenario.planning)
@@ -209,19 +245,22 @@ class _Watch:
         self.ended_by = SAMPLE_LIMIT
         self._time_limit = time_limit
         self._progress = progress
+        self.is_hopeless: Callable[[], bool] = lambda: False
         self._began = self._next_report = 0.0
+        self._doubts_at = math.inf
 
     def start(self) -> None:
         """Begin to count the time."""
         self._began = time.perf_counter()
         self._next_report = self._began + PROGRESS_PERIOD
+        self._doubts_at = self._began + PATIENCE
 
     def elapsed(self) -> float:
         """Time since the start [s]."""
         return time.perf_counter() - self._began
 
     def should_stop(self, samples: int) -> bool:
-        """Whether the time is up; being Python code, this also lets a Ctrl-C through to the planner."""
+        """Whether the time is up or there is no way; being Python code, this also lets a Ctrl-C through."""
         now = time.perf_counter()
         if now - self._began >= self._time_limit:
             self.ended_by = TIME_LIMIT
@@ -229,4 +268,9 @@ class _Watch:
         if self._progress is not None and now >= self._next_report:
             self._next_report = now + PROGRESS_PERIOD
             self._progress(samples, now - self._began)
+        if now >= self._doubts_at:
+            self._doubts_at = math.inf
+            if self.is_hopeless():
+                self.ended_by = NO_WAY
+                return True
         return False

@@ -213,7 +213,7 @@ def test_a_number_of_thousands_of_digits_is_refused_in_one_short_line(capsys: py
 
 @pytest.mark.parametrize(
     ("arguments", "field", "known"),
-    [(["plna"], "COMMAND", COMMANDS), (["completion", "fish"], "SHELL", ["bash", "zsh", "tcsh"])],
+    [(["plna"], "COMMAND", COMMANDS), (["completion", "ksh"], "SHELL", ["bash", "zsh", "tcsh", "fish"])],
 )
 def test_an_unknown_word_is_told_the_known_ones(
     capsys: pytest.CaptureFixture[str], arguments: list[str], field: str, known: list[str]
@@ -409,8 +409,13 @@ def test_completion_knows_commands_planners_and_files(tmp_path: Path, capsys: py
     script = tmp_path / "cbrrt.bash"
     script.write_text(capsys.readouterr().out, encoding="utf-8")
     (tmp_path / "mine.yaml").touch()
-    for line, wanted in (("cbrrt pla", {"plan", "planners"}), ("cbrrt plan --planner cb-rrt-r", {"cb-rrt-robust"}),
-                         ("cbrrt plan mi", {"mine.yaml"})):  # fmt: skip
+    for line, wanted in (
+        ("cbrrt pla", {"plan", "planners"}),
+        ("cbrrt plan --planner cb-rrt-r", {"cb-rrt-robust"}),
+        ("cbrrt plan m", {"mine.yaml", "maze"}),
+        ("cbrrt plan --robot jac", {"jackal"}),
+        ("cbrrt new mi", {"mine.yaml"}),
+    ):
         words = line.split()
         code = f"""source {script}; COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}
                    [[ $(complete -p cbrrt) =~ -F\\ ([^\\ ]+) ]] && ${{BASH_REMATCH[1]}} cbrrt {words[-1]} {words[-2]}
@@ -419,6 +424,15 @@ def test_completion_knows_commands_planners_and_files(tmp_path: Path, capsys: py
             ["bash", "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=True
         )
         assert set(done.stdout.split()) == wanted, done.stderr
+
+
+@pytest.mark.parametrize("shell", ["zsh", "fish", "tcsh"])
+def test_completion_of_other_shells_knows_the_new_names(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["completion", shell]) == 0
+    script = capsys.readouterr().out
+    assert "scenarios" in script and "resolution" in script
+    if shell != "tcsh":
+        assert "jackal" in script and "paper_case1" in script
 
 
 def test_help_imports_nothing_heavy() -> None:

@@ -21,16 +21,16 @@ import cbrrt_ompl
 from cbrrt_ompl.cli import build_parser
 from cbrrt_ompl.problem.robot import Gains, Limits
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
-from cbrrt_ompl.scenario import scenario_file
+from cbrrt_ompl.scenario import footprints, map_layers, scenario_file
 from cbrrt_ompl.scenario.scenario import load_scenario
 from cbrrt_ompl.scenario.sections import Key
 
 SECTIONS: dict[str, Mapping[str, Key]] = {
     "Top level": scenario_file.SCENARIO,
     **scenario_file.OBSTACLES,
-    "map": scenario_file.MAP,
+    "map": map_layers.MAP,
     "robot": scenario_file.ROBOT,
-    "robot.footprint": {name: key for keys in scenario_file.FOOTPRINTS.values() for name, key in keys.items()},
+    "robot.footprint": {name: key for keys in footprints.FOOTPRINTS.values() for name, key in keys.items()},
     "robot.limits": scenario_file.LIMITS,
     "robot.gains": scenario_file.GAINS,
     "start": scenario_file.START,
@@ -146,6 +146,7 @@ def test_the_scenario_on_the_scenario_page_can_be_loaded(docs: Path, tmp_path: P
     [
         pytest.param("getting-started.md", marks=pytest.mark.needs_ompl),
         "own-map.md",
+        "robot.md",
         pytest.param("faq.md", marks=pytest.mark.needs_ompl),
     ],
 )
@@ -156,9 +157,12 @@ def test_the_python_on_the_pages_runs(repository: Path, docs: Path, tmp_path: Pa
         [sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120
     )
     assert done.returncode == 0, done.stderr
-    assert {"getting-started.md": "Exact solution", "own-map.md": "solved", "faq.md": "1 sampler made"}[
-        page
-    ] in done.stdout
+    assert {
+        "getting-started.md": "Exact solution",
+        "own-map.md": "solved",
+        "robot.md": " poses",
+        "faq.md": "1 sampler made",
+    }[page] in done.stdout
 
 
 def test_the_set_up_and_the_law_on_the_page_on_ompl_run(repository: Path, docs: Path, tmp_path: Path) -> None:

@@ -66,7 +66,10 @@ def test_drive_that_stops_ends_with_one(hall: str, tmp_path: Path, capsys: pytes
     hidden = tmp_path / "hidden.yaml"
     hidden.write_text("obstacles:\n  - {type: box, min: [5, 0], max: [5.2, 4]}\n")
     assert main(["drive", hall, "--hidden", str(hidden), "--max-samples", "100", "--seed", "1"]) == 1
-    assert "status              stopped\n" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "status              stopped\n" in out
+    (reason,) = [line for line in out.splitlines() if line.startswith("blocked by")]
+    assert "m away; the last search ended by" in reason
 
 
 def test_drive_with_random_obstacles_is_repeated_by_its_seed(hall: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -80,6 +80,8 @@ def as_16_bits() -> Image.Image:
         (as_palette, "map.png"),
         (as_palette, "map.bmp"),
         (as_16_bits, "map.png"),
+        *((lambda mode=mode: Image.fromarray(GREYS).convert(mode), "map.tif") for mode in ("L", "RGB", "RGBA")),
+        (as_16_bits, "map.tiff"),
         (lambda: Image.fromarray(GREYS), "map.PGM"),
     ],
 )
@@ -92,6 +94,29 @@ def test_a_pgm_of_numbers_in_text_gives_the_same_cells(tmp_path: Path) -> None:
     numbers = "\n".join(" ".join(map(str, row)) for row in GREYS.tolist())
     (tmp_path / "map.pgm").write_text(f"P2\n# CREATOR: map_saver 0.050 m/pix\n4 3\n255\n{numbers}\n")
     np.testing.assert_array_equal(load_map(write_yaml(tmp_path)).cells, CELLS)
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        b"P5\r\n# CREATOR: map_saver 0.050 m/pix\r\n4 3\r\n255\r\n",
+        b"P5 # a\n# b\n4 # c\n3\n# d\n255\n",
+        b"P5\n4 3\n255\n# behind the header\n# twice\n",
+        b"P5 4 3 255 ",
+        b"P5\t4\r3\n255\r",
+    ],
+)
+@pytest.mark.parametrize("bits", [8, 16])
+def test_a_pgm_header_of_any_kind_shifts_no_pixel(tmp_path: Path, header: bytes, bits: int) -> None:
+    """With Windows' line ends, the line feed behind 255 became the first pixel, and all others moved on by one."""
+    pixels = GREYS.tobytes() if bits == 8 else (GREYS.astype(">u2") * 257).astype(">u2").tobytes()
+    (tmp_path / "map.pgm").write_bytes((header if bits == 8 else header.replace(b"255", b"65535")) + pixels)
+    np.testing.assert_array_equal(load_map(write_yaml(tmp_path)).cells, CELLS)
+
+
+def test_a_first_pixel_that_looks_like_a_line_end_stays_a_pixel(tmp_path: Path) -> None:
+    (tmp_path / "map.pgm").write_bytes(b"P5\n3 1\n255\n\n#\n")  # greys 10, 35 and 10
+    assert load_map(write_yaml(tmp_path), may_be_full=True).cells.tolist() == [[X, X, X]]
 
 
 def test_a_pgm_of_16_bits_gives_the_same_cells(tmp_path: Path) -> None:
@@ -136,6 +161,45 @@ def test_comments_after_values_and_keys_of_no_interest_are_skipped(tmp_path: Pat
     np.testing.assert_array_equal(found.cells, CELLS)
 
 
+@pytest.mark.parametrize(
+    "name", ["/home/anna/maps/map.pgm", "~/map.pgm", "maps/map.pgm", r"C:\maps\map.pgm", "$(find nav)/maps/map.pgm"]
+)
+def test_a_map_from_another_machine_takes_the_image_beside_it_with_a_remark(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    write_map(tmp_path)
+    found = load_map(write_yaml(tmp_path, image=f"'{name}'"))
+    np.testing.assert_array_equal(found.cells, CELLS)
+    assert found.remarks == (f"{tmp_path / 'map.yaml'}: image: there is no {name}, {tmp_path / 'map.pgm'} is taken",)
+
+
+def test_a_tilde_is_the_home_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    (tmp_path / "home").mkdir()
+    Image.fromarray(GREYS).save(tmp_path / "home" / "map.pgm")
+    Image.fromarray(np.zeros_like(GREYS)).save(tmp_path / "map.pgm")
+    found = load_map(write_yaml(tmp_path, image="~/map.pgm"))
+    np.testing.assert_array_equal(found.cells, CELLS)
+    assert found.remarks == ()
+
+
+def test_a_missing_image_is_told_with_where_it_was_looked_for_and_what_lies_there(tmp_path: Path) -> None:
+    Image.fromarray(GREYS).save(tmp_path / "map.png")
+    with pytest.raises(MapError) as caught:
+        load_map(write_yaml(tmp_path, image="/far/away.pgm"))
+    assert one_line(caught).endswith(
+        f"image: got '/far/away.pgm', expected a file that exists, looked for as /far/away.pgm and as "
+        f"{tmp_path / 'away.pgm'} (map.png lies there: write image: map.png)"
+    )
+
+
+@pytest.mark.parametrize("yaw", ["nan", "-nan", ".nan", "NaN", "-nan(ind)"])
+def test_a_yaw_that_is_no_number_is_refused_with_the_remedy(tmp_path: Path, yaw: str) -> None:
+    with pytest.raises(MapError, match=r"origin: got \[1.0, -2.0, .*write 0.0 there"):
+        load_map(write_map(tmp_path, origin=f"[1.0, -2.0, {yaw}]"))
+
+
 def test_an_image_may_lie_in_another_folder(tmp_path: Path) -> None:
     (tmp_path / "images").mkdir()
     Image.fromarray(GREYS).save(tmp_path / "images" / "floor.png")
@@ -143,23 +207,38 @@ def test_an_image_may_lie_in_another_folder(tmp_path: Path) -> None:
         np.testing.assert_array_equal(load_map(write_yaml(tmp_path, image=name)).cells, CELLS)
 
 
-def test_alpha_counts_as_brightness_in_trinary_maps(tmp_path: Path) -> None:
-    """As in nav2_map_server: opaque black is occupied with likelihood 0.75, transparent white with 0.25."""
-    pixels = [(0, 0, 0, 255), (0, 0, 0, 0), (255, 255, 255, 0), (255, 255, 255, 255)]
-    assert load_map(write_levels(tmp_path, "RGBA", pixels)).cells.tolist() == [[X, X, U, F]]
-    assert load_map(write_levels(tmp_path, "RGBA", pixels, occupied_thresh="0.8")).cells.tolist() == [[U, X, U, F]]
-    assert load_map(write_levels(tmp_path, "RGBA", pixels, free_thresh="0.26")).cells.tolist() == [[X, X, F, F]]
+@pytest.mark.parametrize("mode", ["trinary", "scale"])
+def test_what_is_not_opaque_is_unknown(tmp_path: Path, mode: str) -> None:
+    pixels = [(0, 0, 0, 255), (0, 0, 0, 254), (255, 255, 255, 0), (255, 255, 255, 255)]
+    assert load_map(write_levels(tmp_path, "RGBA", pixels, mode=mode)).cells.tolist() == [[X, U, U, F]]
 
 
-def test_what_is_not_opaque_is_unknown_in_scale_maps(tmp_path: Path) -> None:
-    pixels = [(0, 0, 0, 255), (0, 0, 0, 254), (255, 255, 255, 0), (128, 128, 128, 255), (255, 255, 255, 255)]
-    path = write_levels(tmp_path, "RGBA", pixels, mode="scale")
-    assert load_map(path).cells.tolist() == [[X, U, U, U, F]]
+@pytest.mark.parametrize(("mode", "between"), [("trinary", U), ("scale", F)])
+def test_the_thresholds_themselves_are_occupied_and_free(tmp_path: Path, mode: str, between: int) -> None:
+    """Greys of 0.6 and 0.2, exact in the single precision that nav2_map_server computes in."""
+    changes = {"mode": mode, "occupied_thresh": "0.6", "free_thresh": "0.2"}
+    path = write_levels(tmp_path, "L", [101, 102, 103, 203, 204, 206], **changes)
+    assert load_map(path).cells.tolist() == [[X, X, between, between, F, F]]
+    path = write_levels(tmp_path, "L", [154, 153, 152, 52, 51, 50], negate="1", **changes)
+    assert load_map(path).cells.tolist() == [[X, X, between, between, F, F]]
+
+
+def test_scale_is_occupied_from_the_grey_on_that_rounds_to_100_percent(tmp_path: Path) -> None:
+    """The static layer of a costmap takes 100 percent for an obstacle and 99 for none."""
+    path = write_levels(tmp_path, "L", [0, 1, 2, 255], mode="scale", occupied_thresh="1.0", free_thresh="0.0")
+    assert load_map(path).cells.tolist() == [[X, X, F, F]]
 
 
 def test_raw_maps_hold_percent_up_to_100_and_unknown_above(tmp_path: Path) -> None:
-    path = write_levels(tmp_path, "L", [0, 19, 20, 65, 66, 100, 101, 255], mode="raw", negate="1")
-    assert load_map(path).cells.tolist() == [[F, F, U, U, X, X, U, U]]
+    path = write_levels(tmp_path, "L", [0, 19, 65, 66, 99, 100, 101, 255], mode="raw", negate="1")
+    assert load_map(path).cells.tolist() == [[F, F, F, F, F, X, U, U]]
+
+
+@pytest.mark.parametrize("mode", ["Trinary", "SCALE", "Raw"])
+def test_the_mode_may_be_written_in_any_case(tmp_path: Path, mode: str) -> None:
+    greys = [0, 128, 255]
+    found = load_map(write_levels(tmp_path, "L", greys, mode=mode)).cells.tolist()
+    assert found == load_map(write_levels(tmp_path, "L", greys, mode=mode.lower())).cells.tolist()
 
 
 def test_colours_are_as_bright_as_their_mean(tmp_path: Path) -> None:
@@ -590,6 +669,27 @@ def test_a_dynobench_robot_may_be_kept_from_reversing(tmp_path: Path) -> None:
     files = dynobench_files(tmp_path)
     assert load_dynobench(*files).robot.limits.v_min == -0.5
     assert load_dynobench(*files, forward_only=True).robot.limits.v_min == 0.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            "dt:",
+            'dynamics: "unicycle1"\ndt:',
+            "dynamics: got the robot unicycle1, expected unicycle2, the second-order",
+        ),
+        ("dt:", "dynamics: car1_v0\ndt:", "dynamics: got the robot car1_v0"),
+        ("min_vel: -0.5", "min_vel: 0.25", "min_vel: got 0.25, expected 0 or less: a robot that cannot stand still"),
+        ("type: unicycle2_v0", "type: unicycle1_v0", "robots[0].type: got the robot unicycle1_v0, expected unicycle2"),
+        ("robots:", "robots: [{}, {}]\nothers:", "robots: got 2 robots, expected a list of one robot"),
+    ],
+)
+def test_dynobench_problems_of_other_kinds_are_refused_by_name(tmp_path: Path, old: str, new: str, words: str) -> None:
+    assert old in PROBLEM or old in MODEL
+    with pytest.raises(MapError) as caught:
+        load_dynobench(*dynobench_files(tmp_path, PROBLEM.replace(old, new), MODEL.replace(old, new)))
+    assert words in one_line(caught)
 
 
 @pytest.mark.parametrize(

@@ -277,3 +277,53 @@ def test_a_thousand_polygons_cost_a_point_no_more_than_those_around_it() -> None
     depths = [world.signed_clearance(i % 40 + 0.3, i // 40 + 0.2) for i in range(1600)]
     assert time.process_time() - started < 1.0
     assert depths == pytest.approx([-shapely.Polygon(corners).exterior.distance(shapely.Point(0.3, 0.2))] * 1600)
+
+
+def blocked_by(costs: ArrayLike, **settings: object) -> list[list[bool]]:
+    """Which cells of a costmap the world of it blocks."""
+    world = World.from_costmap(costs, 1.0, **settings)
+    rows, columns = np.shape(costs)
+    return [[world.collides(POINT, (c + 0.5, r + 0.5, 0.0)) for c in range(columns)] for r in range(rows)]
+
+
+def test_a_costmap_blocks_where_it_is_lethal_or_unknown() -> None:
+    costs = np.array([[0, 252, 253, 254, 255]], dtype=np.uint8)
+    assert blocked_by(costs) == [[False, False, False, True, True]]
+    assert blocked_by(costs, unknown="free") == [[False, False, False, True, False]]
+    assert blocked_by(costs, lethal_threshold=253) == [[False, False, True, True, True]]
+    assert blocked_by(costs.astype(np.int64)) == blocked_by(costs)
+
+
+@pytest.mark.parametrize(("dtype", "unseen"), [(np.int8, -1), (np.int64, -1), (np.uint8, 255)])
+def test_an_occupancy_grid_blocks_at_100_percent_or_unknown(dtype: type, unseen: int) -> None:
+    """In uint8 as well: nav2_simple_commander's PyCostmap2D keeps percent in one, -1 as 255."""
+    costs = np.array([[0, 50, 99, 100, unseen]]).astype(dtype)
+    assert blocked_by(costs) == [[False, False, False, True, True]]
+    assert blocked_by(costs, lethal_threshold=65) == [[False, False, True, True, True]]
+    assert blocked_by(costs, unknown="free") == [[False, False, False, True, False]]
+
+
+def test_the_first_row_of_a_costmap_is_the_lowest_and_its_origin_turns_it() -> None:
+    world = World.from_costmap(np.array([[254, 0], [0, 0]]), 0.5, (1.0, 2.0, math.pi / 2))
+    assert world.collides(POINT, (0.75, 2.25, 0.0))
+    assert not world.collides(POINT, (0.75, 2.75, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("costs", "settings", "words"),
+    [
+        ([[0.5]], {}, "costs: got values of type float64, expected whole numbers"),
+        ([0, 1], {}, "costs: got the shape (2,), expected cells in rows and columns"),
+        ([[0], [0, 1]], {}, "costs: got"),
+        ([[-2, 0]], {}, "costs: got values from -2 to 0"),
+        ([[256]], {}, "costs: got values from 256 to 256"),
+        ([[0, 254]], {"lethal_threshold": 255}, "lethal_threshold: got 255, expected a whole number from 1 to 254"),
+        ([[0, 100]], {"lethal_threshold": 0}, "lethal_threshold: got 0, expected a whole number from 1 to 100"),
+        ([[0, 100]], {"lethal_threshold": 65.0}, "lethal_threshold: got 65.0"),
+        ([[254]], {}, "cells: got 1 x 1 blocked ones"),
+    ],
+)
+def test_what_is_no_costmap_is_refused(costs: ArrayLike, settings: dict[str, object], words: str) -> None:
+    with pytest.raises(MapError) as caught:
+        World.from_costmap(costs, 1.0, **settings)
+    assert words in str(caught.value)

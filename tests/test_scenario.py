@@ -421,7 +421,7 @@ MISTAKES = {
     "map that is a number": (
         "obstacles:\n",
         "map: 3\nobstacles:\n",
-        "map: got 3, expected a mapping with the keys file, unknown, resolution",
+        "map: got 3, expected a mapping with the keys file, unknown, resolution, keepout",
     ),
     "unknown cells": (
         "obstacles:\n",
@@ -433,7 +433,11 @@ MISTAKES = {
 
 @pytest.mark.parametrize(("old", "new", "complaint"), MISTAKES.values(), ids=MISTAKES)
 def test_a_mistake_is_one_line_that_names_it(tmp_path: Path, old: str, new: str, complaint: str) -> None:
-    assert complaints(tmp_path, changed(old, new)) == [complaint]
+    (line,) = complaints(tmp_path, changed(old, new))
+    if complaint.endswith(("and no bound", "in collision")):
+        assert line.startswith(complaint)  # and then comes what is there
+    else:
+        assert line == complaint
 
 
 def test_a_polygon_that_crosses_itself_is_named_with_the_reason(tmp_path: Path) -> None:
@@ -751,7 +755,11 @@ def test_saving_where_nothing_can_be_written_is_one_line(tmp_path: Path) -> None
 
 
 class FakeMap:
+    remarks = ()
+
     """A map of one wall, and one cell that nobody has seen."""
+
+    remarks = ()
 
     def bounds(self) -> Bounds:
         return Bounds((0.0, 0.0), (4.0, 3.0))

@@ -9,16 +9,21 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.benchmark.database import open_database
+from cbrrt_ompl.benchmark.database import open_database, write_database
+from cbrrt_ompl.benchmark.log import read_log
 from cbrrt_ompl.errors import InputError, Problem
 
 CRASH = 7
 """OMPL's status of a run that ended by a crash."""
+
+LOG_START = b"OMPL version "
+"""What logs of OMPL's Benchmark begin with."""
 
 PREFIXES = ("control_", "geometric_")
 """What OMPL's Benchmark puts before the names of planners."""
@@ -83,14 +88,18 @@ class Experiment:
 
 
 def read_experiments(path: str | Path) -> list[Experiment]:
-    """Read a benchmark database.
+    """Read a benchmark database, or a log as OMPL's Benchmark writes it.
 
     Args:
         path: the file.
 
     Raises:
-        InputError: if it is no benchmark database, or holds no runs.
+        InputError: if it is neither, or holds no runs.
     """
+    if is_log(path):
+        with TemporaryDirectory() as folder:
+            write_database(Path(folder) / "log.db", [read_log(path)])
+            return read_experiments(Path(folder) / "log.db")
     with closing(open_database(path)) as connection:
         connection.row_factory = sqlite3.Row
         try:
@@ -103,6 +112,15 @@ def read_experiments(path: str | Path) -> list[Experiment]:
     if not any(experiment.series for experiment in experiments):
         raise InputError(Problem("", "no runs", "a database with runs"), str(path))
     return experiments
+
+
+def is_log(path: str | Path) -> bool:
+    """Whether a file is a log of OMPL's Benchmark, by its first words."""
+    try:
+        with Path(path).open("rb") as file:
+            return file.read(len(LOG_START)) == LOG_START
+    except OSError:
+        return False
 
 
 def _read_experiment(connection: sqlite3.Connection, row: dict[str, Any]) -> Experiment:

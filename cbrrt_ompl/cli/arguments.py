@@ -44,15 +44,20 @@ def add_command(
     return parser
 
 
-def add_scenario(parser: argparse.ArgumentParser, name: str = "scenario", nargs: str | None = None) -> None:
-    """``SCENARIO``, a file or the name of one that comes with the package."""
+def add_scenario(
+    parser: argparse.ArgumentParser, name: str = "scenario", nargs: str | None = None, or_map: bool = False
+) -> None:
+    """``SCENARIO``, a file or the name of one that comes with the package; or a map where the command takes one."""
     text = "scenario file (YAML), or the name of one that comes along, as paper_case1"
-    parser.add_argument(name, type=Path, nargs=nargs, metavar="SCENARIO", help=text)
+    metavar = "SCENARIO"
+    if or_map:
+        text, metavar = f"{text}; or a map, as depot.yaml of map_server", "SCENARIO|MAP"
+    parser.add_argument(name, type=Path, nargs=nargs, metavar=metavar, help=text)
 
 
-def add_planner(parser: argparse.ArgumentParser, default: str) -> None:
-    """``--planner``."""
-    text = f"see 'cbrrt planners' (default: {default})"
+def add_planner(parser: argparse.ArgumentParser, default: str | None, meaning: str = "") -> None:
+    """``--planner``; without a default, the meaning says what is taken."""
+    text = f"see 'cbrrt planners' (default: {default or meaning})"
     parser.add_argument("--planner", default=default, metavar="NAME", help=text)
 
 
@@ -77,6 +82,12 @@ def add_json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print the result as JSON, in SI units")
 
 
+def add_map(parser: argparse.ArgumentParser) -> None:
+    """``MAP``, a file."""
+    text = "map: a YAML file of map_server, an image (dark is occupied) or a MovingAI map"
+    parser.add_argument("scenario", type=Path, metavar="MAP", help=text)
+
+
 def load_trajectory(arguments: argparse.Namespace) -> Trajectory:
     """The trajectory file of a command line, kinematic where the file or ``--kinematic`` says so."""
     from cbrrt_ompl.trajectory.trajectory import Trajectory
@@ -93,6 +104,11 @@ def seconds(text: str) -> float:
 def metres(text: str) -> float:
     """A distance from the command line [m]."""
     return _above_zero(text, "metres")
+
+
+def tolerance(text: str) -> float:
+    """A deviation from the command line."""
+    return _above_zero(text, "metres and radians")
 
 
 def count(text: str) -> int:

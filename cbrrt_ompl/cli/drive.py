@@ -103,6 +103,7 @@ def _data(result: DriveResult) -> dict[str, Any]:
         "planner": result.settings.planner,
         "status": result.status,
         "reached": result.reached,
+        "blocked_by": result.blocked_by or None,
         "duration": result.trajectory.duration,
         "length": result.trajectory.length,
         "plans": len(result.replans),
@@ -122,6 +123,7 @@ def _values(data: dict[str, Any]) -> dict[str, str]:
     violations = data["violations"]
     return {
         **heading(data, data["reached"]),
+        **({"blocked by": data["blocked_by"]} if data["blocked_by"] else {}),
         "duration": f"{data['duration']:.2f} s",
         "length": f"{data['length']:.2f} m",
         "plans": f"{data['plans']}, {data['plans_taken']} taken",

@@ -17,6 +17,7 @@ from cbrrt_ompl.cli.arguments import (
 from cbrrt_ompl.cli.exit_codes import DONE, FAILED
 from cbrrt_ompl.cli.output import heading, print_json, print_values
 from cbrrt_ompl.cli.output_files import add_output_files, check_output_files
+from cbrrt_ompl.cli.problem import MAP_PLANNERS, add_problem, given_scenario, map_planner
 from cbrrt_ompl.cli.progress import plan_progress, warm_up
 
 if TYPE_CHECKING:
@@ -33,25 +34,27 @@ FILES = {
 def add_parser(commands: Commands) -> None:
     """Add the command to the grammar."""
     example = "cbrrt plan paper_case1 --seed 1 --trajectory case1.csv --figure case1.png"
-    parser = add_command(commands, "plan", run, "plan a trajectory through a scenario", example)
-    add_scenario(parser)
-    add_planner(parser, "cb-rrt")
+    parser = add_command(commands, "plan", run, "plan a trajectory through a scenario or a map", example)
+    add_scenario(parser, or_map=True)
+    add_planner(parser, None, f"cb-rrt; in a map {MAP_PLANNERS[0]}")
     add_seed(parser)
     add_time_limit(parser, "planning time")
     add_output_files(parser, FILES)
     add_json(parser)
+    add_problem(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """``cbrrt plan``."""
     check_output_files(arguments, FILES)
     from cbrrt_ompl.planning import plan
-    from cbrrt_ompl.scenario.scenario import load_scenario
+    from cbrrt_ompl.scenario.sources import is_map
 
-    scenario = load_scenario(arguments.scenario)
-    warm_up(arguments.planner)
-    with plan_progress(scenario.planning.max_samples, arguments.planner) as progress:
-        result = plan(scenario, arguments.planner, arguments.seed, arguments.time_limit, progress=progress)
+    scenario = given_scenario(arguments)
+    planner = arguments.planner or (map_planner() if is_map(arguments.scenario) else "cb-rrt")
+    warm_up(planner)
+    with plan_progress(scenario.planning.max_samples, planner) as progress:
+        result = plan(scenario, planner, arguments.seed, arguments.time_limit, progress=progress)
     trajectory = result.trajectory
     if arguments.trajectory is not None and trajectory is not None:
         trajectory.save(arguments.trajectory)

@@ -8,24 +8,43 @@ from __future__ import annotations
 import argparse
 import io
 import os
+import re
 import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from cbrrt_ompl.cli import bench, completion, demo, drive, plan, planners, report, reproduce, show, verify
+from cbrrt_ompl.cli import (
+    bench,
+    completion,
+    demo,
+    drive,
+    new,
+    plan,
+    planners,
+    report,
+    reproduce,
+    robots,
+    scenarios,
+    show,
+    verify,
+)
 from cbrrt_ompl.cli.exit_codes import BAD_INPUT, BROKEN_PIPE, INTERRUPTED
 from cbrrt_ompl.cli.output import print_error
 from cbrrt_ompl.errors import CbrrtError, Problem
 
-COMMANDS = (plan, drive, verify, show, planners, bench, report, reproduce, demo, completion)
+COMMANDS = (
+    plan, drive, verify, show, new, planners, robots, scenarios, bench, report, reproduce, demo, completion,
+)  # fmt: skip
 """The modules of the commands, in the order of the help."""
 
 EXAMPLES = """\
 examples:
   cbrrt plan paper_case1 --seed 1 --figure case1.png   a scene of the paper
-  cbrrt plan depot.yaml --planner cb-rrt-robust --trajectory depot.csv
+  cbrrt show depot.yaml --figure depot.png             a map of map_server
+  cbrrt plan depot.yaml --robot jackal --start 5 3 90deg --goal 24 10
+  cbrrt new depot.yaml --robot jackal --output tour.yaml
   cbrrt drive office --seed 2 --animation office.gif   plan again on the way
-  cbrrt verify depot.csv depot.yaml                    check it by other code
+  cbrrt verify case1.csv paper_case1                   check it by other code
   cbrrt bench maze office --runs 20 --database bench.db --log-dir logs
   cbrrt report bench.db --output report                tables and charts
 
@@ -78,6 +97,11 @@ def build_parser() -> argparse.ArgumentParser:
 
 class _Parser(argparse.ArgumentParser):
     """A parser whose errors are one line and in the words of all others of this program."""
+
+    def __init__(self, **settings: Any) -> None:
+        """A parser that takes -90deg and -1e-3 for values and not for options."""
+        super().__init__(**settings)
+        self._negative_number_matcher = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?(deg)?$", re.IGNORECASE)
 
     def error(self, message: str) -> NoReturn:
         """Print the line and leave with exit code 2."""

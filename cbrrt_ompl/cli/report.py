@@ -20,9 +20,11 @@ COLUMNS = {"planner": 15, "succeeded": 12, "95 %": 10, "time [ms]": 9, "nodes": 
 
 def add_parser(commands: Commands) -> None:
     """Add the command to the grammar."""
-    summary = "make tables and charts from a benchmark database"
+    summary = "make tables and charts from a benchmark database or log"
     parser = add_command(commands, "report", run, summary, "cbrrt report bench.db --output report")
-    parser.add_argument("database", type=Path, metavar="DB", help="database of 'cbrrt bench'")
+    parser.add_argument(
+        "database", type=Path, metavar="DB", help="database of 'cbrrt bench', or a log of OMPL's Benchmark"
+    )
     add_output_folder(parser, "report", "tables and charts")
     parser.add_argument(
         "--reference", metavar="NAME", help="planner to compare the others with (default: cb-rrt, if it is there)"

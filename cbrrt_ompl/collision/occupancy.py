@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Integral
 
 import numpy as np
 from numba import njit
@@ -88,6 +89,46 @@ def cells_from(
     return cells
 
 
+def cells_from_costs(costs: ArrayLike, lethal_threshold: int | None = None) -> NDArray[np.int8]:
+    """Cells of a Nav2 costmap or of a ROS OccupancyGrid; see :meth:`World.from_costmap`.
+
+    Args:
+        costs: whole numbers, shape (rows, columns): 0 to 254 in a costmap, 0 to 100 in an OccupancyGrid; 255 and -1 are
+            unknown.
+        lethal_threshold: what is occupied, with all above it; 254 or 100 if not given.
+
+    Returns:
+        ``UNKNOWN``, ``FREE`` or ``OCCUPIED``, shape (rows, columns).
+
+    Raises:
+        MapError: if these are no such values.
+    """
+    try:
+        values = np.asarray(costs)
+    except ValueError:  # rows of different lengths
+        raise MapError(Problem("costs", costs, "cells in rows and columns")) from None
+    if values.ndim != 2 or values.size == 0:
+        raise MapError(Problem("costs", Remark(f"the shape {values.shape}"), "cells in rows and columns"))
+    if values.dtype.kind not in "iu":
+        expected = "whole numbers: a costmap (0 to 254, 255 unknown) or an OccupancyGrid (0 to 100, -1 unknown)"
+        raise MapError(Problem("costs", Remark(f"values of type {values.dtype}"), expected))
+    check_cell_count(values.shape, "costs")
+    low, high = int(values.min()), int(values.max())
+    if low < -1 or high > 255:
+        expected = "0 to 254 (a costmap) or 0 to 100 (an OccupancyGrid), and 255 or -1 where unknown"
+        raise MapError(Problem("costs", Remark(f"values from {low} to {high}"), expected))
+    is_costmap = ((values > 100) & (values < 255)).any()
+    lethal = 254 if is_costmap else 100
+    if lethal_threshold is not None:
+        is_whole = isinstance(lethal_threshold, Integral) and not isinstance(lethal_threshold, bool)
+        if not is_whole or not 1 <= lethal_threshold <= lethal:
+            raise MapError(Problem("lethal_threshold", lethal_threshold, f"a whole number from 1 to {lethal}"))
+        lethal = lethal_threshold
+    cells = np.where(values >= lethal, OCCUPIED, FREE).astype(np.int8)
+    cells[(values == 255) | (values == -1)] = UNKNOWN
+    return cells
+
+
 def blocked_cells(cells: NDArray[np.int8], unknown: str) -> NDArray[np.bool_]:
     """Which cells nobody may enter.
 
@@ -159,6 +200,13 @@ class GridLayer:
     @cached_property
     def obstacles(self) -> tuple[Obstacle, ...]:
         """Boxes where the grid lies along the axes; else oriented boxes and a triangle in each corner of the bounds."""
+        is_straight = _quarter_turns(self.origin[2]) is not None
+        outer = () if is_straight else _outer_corners(self.blocked.shape, self.resolution, self.origin)
+        return (*self.boxes, *outer)
+
+    @property
+    def boxes(self) -> tuple[Obstacle, ...]:
+        """The obstacles that cover the cells, without what lies outside of the grid."""
         lows, highs = self._rectangles
         if _quarter_turns(self.origin[2]) is not None:
             return tuple(
@@ -166,8 +214,7 @@ class GridLayer:
             )
         centers, sizes, yaw = 0.5 * (lows + highs), (highs - lows).tolist(), self.origin[2]
         placed = _in_world(centers, self.origin).tolist()
-        boxes = [OrientedBox((x, y), (w, h), yaw) for (x, y), (w, h) in zip(placed, sizes, strict=True)]
-        return *boxes, *_outer_corners(self.blocked.shape, self.resolution, self.origin)
+        return tuple(OrientedBox((x, y), (w, h), yaw) for (x, y), (w, h) in zip(placed, sizes, strict=True))
 
     @cached_property
     def pieces(self) -> Pieces:

@@ -18,6 +18,7 @@ from cbrrt_ompl.collision.occupancy import (
     GridLayer,
     blocked_cells,
     cells_from,
+    cells_from_costs,
 )
 from cbrrt_ompl.collision.pieces import Pieces, join, obstacle_pieces
 from cbrrt_ompl.collision.scene import Scene, make_scene
@@ -105,6 +106,40 @@ class World:
             MapError: if these are no such values, or no cell is free.
         """
         blocked = blocked_cells(cells_from(grid, occupied_thresh, free_thresh), unknown)
+        return cls.from_layer(GridLayer(blocked, resolution, origin))  # type: ignore[arg-type]  # checked in there
+
+    @classmethod
+    def from_costmap(
+        cls,
+        costs: ArrayLike,
+        resolution: float,
+        origin: Sequence[float] = (0.0, 0.0, 0.0),
+        *,
+        lethal_threshold: int | None = None,
+        unknown: str = "occupied",
+    ) -> World:
+        """World of a Nav2 costmap, or of a ROS OccupancyGrid; its first row is the lowest.
+
+        A costmap holds 0 to 254, and 255 where nobody knows; the footprint is checked exactly here, so that inflated
+        costs block nothing and 254 alone does. An OccupancyGrid holds 0 to 100 percent, and -1 where nobody knows (255
+        in arrays without a sign); as for the static layer of Nav2, 100 alone blocks. An array with a value from 101 to
+        254 is a costmap, any other an OccupancyGrid.
+
+        Args:
+            costs: whole numbers, shape (rows, columns).
+            resolution: side of a cell [m].
+            origin: as in :meth:`from_grid`.
+            lethal_threshold: what blocks, with all above it; 254 in a costmap and 100 in an OccupancyGrid if not given.
+                In a costmap, 253 also blocks where the inscribed disc of Nav2's robot would touch.
+            unknown: whether unknown cells count as ``occupied`` or ``free``.
+
+        Returns:
+            The world, with the blocked cells merged into boxes.
+
+        Raises:
+            MapError: if these are no such values, or no cell is free.
+        """
+        blocked = blocked_cells(cells_from_costs(costs, lethal_threshold), unknown)
         return cls.from_layer(GridLayer(blocked, resolution, origin))  # type: ignore[arg-type]  # checked in there
 
     @classmethod

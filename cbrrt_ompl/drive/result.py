@@ -10,9 +10,12 @@ from numpy.typing import NDArray
 
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.drive.settings import DriveSettings
+from cbrrt_ompl.planning import SOLVED
 from cbrrt_ompl.problem.obstacles import Obstacle
 from cbrrt_ompl.problem.settings import Goal, State
+from cbrrt_ompl.scenario.connectivity import has_no_way
 from cbrrt_ompl.scenario.scenario import Scenario
+from cbrrt_ompl.scenario.why_not import nearest_thing
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.verification import Verification, verify
 
@@ -100,6 +103,21 @@ class DriveResult:
     def computing_times(self) -> NDArray[np.float64]:
         """Times of all computing in the cycles, shape (m,) [s]."""
         return np.array([cycle.computing_time for cycle in self.cycles])
+
+    @cached_property
+    def blocked_by(self) -> str:
+        """Why the robot has stopped: what is nearest, the last plan's status, and whether there is a way at all."""
+        if self.reached:
+            return ""
+        last, robot = self.trajectory.states[-1], self.scenario.robot
+        nearest = nearest_thing(self.world, robot.footprint, last[:3].tolist(), len(self.scenario.world.obstacles))
+        statuses = [replan.status for replan in self.replans]
+        searched = f"; the last search ended by {statuses[-1]}" if statuses and statuses[-1] != SOLVED else ""
+        here = State(*last.tolist())
+        closed = "; there is no way on for this footprint"
+        return (
+            f"{nearest}{searched}{closed if has_no_way(self.world, robot.footprint, here, self.scenario.goal) else ''}"
+        )
 
     @cached_property
     def verification(self) -> Verification:

@@ -14,11 +14,14 @@ from cbrrt_ompl.figures.figures import (
     draw_velocities,
     draw_world,
 )
+from cbrrt_ompl.figures.maps import draw_draft, draw_map
 
 __all__ = [
     "draw_computing_times",
+    "draw_draft",
     "draw_drive",
     "draw_extension",
+    "draw_map",
     "draw_plan",
     "draw_scene",
     "draw_trajectory",

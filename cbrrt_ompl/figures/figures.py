@@ -22,7 +22,7 @@ from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from cbrrt_ompl.collision.world import World
-from cbrrt_ompl.problem.obstacles import Box, Disc, Obstacle
+from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, Obstacle
 from cbrrt_ompl.problem.robot import Footprint, Limits, Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.trajectory.trajectory import Trajectory
@@ -87,9 +87,8 @@ def draw_scene(ax: Axes, scenario: Scenario) -> Axes:
         The axes.
     """
     draw_world(ax, scenario.world)
-    mark = 0.05 * max(scenario.world.bounds.size)  # length of a heading mark [m]
-    _draw_start(ax, scenario, mark)
-    _draw_goal(ax, scenario, mark)
+    draw_start(ax, scenario.start, scenario.robot.footprint, scenario.world.bounds)
+    draw_goal(ax, scenario.goal, scenario.world.bounds)
     return ax
 
 
@@ -535,21 +534,20 @@ def obstacle_path(obstacle: Obstacle) -> Path:
     return Path.make_compound_path(*(Path(np.vstack([ring, ring[:1]]), closed=True) for ring in rings))
 
 
-def _draw_start(ax: Axes, scenario: Scenario, mark: float) -> None:
-    """Footprint and heading at the start."""
-    x, y, theta = scenario.start[:3]
-    footprint = scenario.robot.footprint
+def draw_start(ax: Axes, start: State, footprint: Footprint, bounds: Bounds, color: str = START_COLOR) -> None:
+    """Draw footprint and heading at the start."""
+    x, y, theta = start[:3]
     if footprint.kind != "point":
         outline = footprint.outline_at((x, y, theta))
-        ax.add_patch(Polygon(outline, fill=False, edgecolor=START_COLOR, linewidth=1.0, zorder=6))
-    _draw_heading(ax, x, y, theta, max(mark, 1.3 * footprint.circumscribed_radius), START_COLOR)
+        ax.add_patch(Polygon(outline, fill=False, edgecolor=color, linewidth=1.0, zorder=6))
+    _draw_heading(ax, x, y, theta, max(_mark(bounds), 1.3 * footprint.circumscribed_radius), color)
     ax.plot(
         x,
         y,
         linestyle="none",
         marker="o",
         markersize=4.5,
-        color=START_COLOR,
+        color=color,
         zorder=6,
         scalex=False,
         scaley=False,
@@ -557,13 +555,12 @@ def _draw_start(ax: Axes, scenario: Scenario, mark: float) -> None:
     )
 
 
-def _draw_goal(ax: Axes, scenario: Scenario, mark: float) -> None:
-    """Disc of the goal and, where it is restricted, the sector of the headings."""
-    goal = scenario.goal
-    radius = min(goal.tolerance, 2.0 * max(scenario.world.bounds.size))  # a larger one looks the same and takes long
+def draw_goal(ax: Axes, goal: Goal, bounds: Bounds, color: str = "black") -> None:
+    """Draw the disc of the goal and, where it is restricted, the sector of the headings."""
+    radius = min(goal.tolerance, 2.0 * max(bounds.size))  # a larger one looks the same and takes long
     ax.add_patch(Circle((goal.x, goal.y), radius, facecolor=GOAL_COLOR, edgecolor="none", alpha=0.35, zorder=1.5))
     border = Circle(
-        (goal.x, goal.y), radius, fill=False, edgecolor="black", linewidth=0.9, linestyle=(0, (3, 2)), zorder=6
+        (goal.x, goal.y), radius, fill=False, edgecolor=color, linewidth=0.9, linestyle=(0, (3, 2)), zorder=6
     )
     ax.add_patch(border)
     ax.plot(
@@ -572,17 +569,22 @@ def _draw_goal(ax: Axes, scenario: Scenario, mark: float) -> None:
         linestyle="none",
         marker="+",
         markersize=6,
-        color="black",
+        color=color,
         zorder=6,
         scalex=False,
         scaley=False,
         label="goal",
     )
     if goal.theta is not None:
-        reach = max(mark, radius)
+        reach = max(_mark(bounds), radius)
         half, middle = math.degrees(min(goal.heading_tolerance, math.pi)), math.degrees(goal.theta)
-        ax.add_patch(Wedge((goal.x, goal.y), reach, middle - half, middle + half, color="black", alpha=0.15, zorder=6))
-        _draw_heading(ax, goal.x, goal.y, goal.theta, reach, "black")
+        ax.add_patch(Wedge((goal.x, goal.y), reach, middle - half, middle + half, color=color, alpha=0.15, zorder=6))
+        _draw_heading(ax, goal.x, goal.y, goal.theta, reach, color)
+
+
+def _mark(bounds: Bounds) -> float:
+    """Length of the mark of a heading [m]."""
+    return 0.05 * max(bounds.size)
 
 
 def _draw_heading(ax: Axes, x: float, y: float, theta: float, length: float, color: str) -> None:

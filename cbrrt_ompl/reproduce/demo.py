@@ -15,7 +15,8 @@ from cbrrt_ompl.files import save_figure, write_file
 from cbrrt_ompl.ompl_plugin.availability import has_ompl
 from cbrrt_ompl.planning import PlanResult, plan
 from cbrrt_ompl.reproduce.published import PAPER, Published
-from cbrrt_ompl.scenario.scenario import Scenario, load_scenario, scenario_path
+from cbrrt_ompl.scenario.scenario import Scenario, load_scenario
+from cbrrt_ompl.scenario.sources import scenario_path
 from cbrrt_ompl.verification import verify
 
 TIME_LIMIT = 300.0

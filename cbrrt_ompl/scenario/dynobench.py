@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.collision.world import World
-from cbrrt_ompl.errors import InputError, MapError, Problem, SettingsError
+from cbrrt_ompl.errors import InputError, MapError, Problem, Remark, SettingsError
 from cbrrt_ompl.files import as_path
 from cbrrt_ompl.problem.obstacles import Bounds, Box
 from cbrrt_ompl.problem.robot import Footprint, Limits, Robot
@@ -29,6 +29,9 @@ from cbrrt_ompl.scenario.sections import (
 
 if TYPE_CHECKING:
     from cbrrt_ompl.scenario.scenario import Scenario
+
+MODEL = "unicycle2"
+"""The robot that is read, by dynobench's name."""
 
 PUBLISHED_TOLERANCE = 0.2
 """Goal tolerance published for planners that sample, in dynobench's metric."""
@@ -65,6 +68,7 @@ def load_dynobench(
 
     if not (is_number(tolerance) and tolerance > 0.0):
         raise SettingsError(Problem("tolerance", tolerance, "a number above 0"))
+    _refuse_other_kinds(as_path(model_path, MapError))
     model = _read(as_path(model_path, MapError), _MODEL)
     problem = _read(as_path(problem_path, MapError), _PROBLEM)
     limits = Limits(**{ours: model[theirs] for ours, theirs in _LIMITS.items()})
@@ -80,6 +84,23 @@ def load_dynobench(
         goal=_goal(driver["goal"], model["distance_weights"], tolerance),
         planning=PlanningSettings(step=model["dt"]),
     )
+
+
+def _refuse_other_kinds(path: Path) -> None:
+    """Refuse models of other robots by the name that their file gives them, and not by the keys that they lack."""
+    try:
+        data = read_yaml(path, [])
+    except InputError as error:
+        raise MapError(error.problems, str(path)) from None
+    if not isinstance(data, Mapping):
+        return
+    slowest, kind = data.get("min_vel"), data.get("dynamics")
+    if is_number(slowest) and slowest > 0.0:
+        expected = "0 or less: a robot that cannot stand still is not planned for"
+        raise MapError(Problem("min_vel", slowest, expected), str(path))
+    if isinstance(kind, str) and not kind.startswith(MODEL):
+        expected = f"{MODEL}, the second-order unicycle"
+        raise MapError(Problem("dynamics", Remark(f"the robot {kind}"), expected), str(path))
 
 
 def _goal(state: list[float], weights: list[float], tolerance: float) -> Goal:
@@ -173,11 +194,17 @@ def _driver(value: object, path: str, report: Report) -> dict[str, Any] | None:
 
 
 def _drivers(value: object, path: str, report: Report) -> list[Any] | None:
-    if isinstance(value, list) and len(value) == 1:
-        found: list[Any] = list_of(_driver, "")(value, path, report)
-        return found
-    report.add(path, value, "a list of one robot")
-    return None
+    if not isinstance(value, list) or len(value) != 1:
+        several = isinstance(value, list) and len(value) > 1
+        found = Remark(f"{len(value)} robots") if several else value  # type: ignore[arg-type]  # a list
+        report.add(path, found, f"a list of one robot{': problems of several are not planned for' * several}")
+        return None
+    kind = value[0].get("type") if isinstance(value[0], Mapping) else None
+    if isinstance(kind, str) and not kind.startswith(MODEL):
+        report.add(f"{path}[0].type", Remark(f"the robot {kind}"), f"{MODEL}, the second-order unicycle")
+        return None
+    found_robots: list[Any] = list_of(_driver, "")(value, path, report)
+    return found_robots
 
 
 _STATE = "x, y, theta, v, omega"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -10,12 +9,15 @@ from typing import Any
 
 from cbrrt_ompl.checks import A_NUMBER, LARGEST, is_number
 from cbrrt_ompl.collision.world import World
-from cbrrt_ompl.errors import MISSING, InputError, Problem, Remark, ScenarioError
+from cbrrt_ompl.errors import Problem, Remark, ScenarioError
 from cbrrt_ompl.files import as_path, write_file
 from cbrrt_ompl.problem.robot import Limits, Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
-from cbrrt_ompl.scenario.scenario_file import MapSource, read_parts, scenario_data
+from cbrrt_ompl.scenario.map_layers import MapSource
+from cbrrt_ompl.scenario.scenario_file import read_parts, scenario_data
 from cbrrt_ompl.scenario.sections import Report
+from cbrrt_ompl.scenario.sources import Source, read_source
+from cbrrt_ompl.scenario.why_not import why_not
 
 HORIZON_TOLERANCE = 0.01
 """Share of the horizon that rounding it to whole steps may add or take away."""
@@ -81,7 +83,8 @@ def load_scenario(path: str | Path) -> Scenario:
     """Scenario from a YAML file.
 
     Args:
-        path: the file; or the name of a scenario that comes with the package, where there is no such file.
+        path: the file; or the name of a scenario that comes with the package, where there is no such file; or a problem
+            of a MovingAI benchmark, ``arena.map.scen:12`` for the twelfth.
 
     Returns:
         The scenario, checked.
@@ -89,35 +92,8 @@ def load_scenario(path: str | Path) -> Scenario:
     Raises:
         ScenarioError: with every mistake in the file, one line each.
     """
-    from cbrrt_ompl.scenario.plain_yaml import read_yaml
-
-    path = as_path(path, ScenarioError)
-    if not (path.suffix or path.parent.name or os.path.exists(path)):
-        path = scenario_path(path.name)
     report = Report()
-    try:
-        data = read_yaml(path, report.problems)
-    except InputError as error:
-        raise ScenarioError(error.problems, str(path)) from None
-    return _make(data, str(path), path.parent, report)
-
-
-def scenario_path(name: str) -> Path:
-    """The file of a scenario that comes with the package, in a checkout or in an installed wheel.
-
-    Args:
-        name: name of the file without its suffix.
-
-    Raises:
-        ScenarioError: if there is no such file, with the names that there are.
-    """
-    package = Path(__file__).resolve().parent.parent
-    files = [file for folder in (package, package.parent) for file in (folder / "scenarios").glob("*.yaml")]
-    found = {file.stem: file for file in sorted(files)}
-    if name not in found:
-        expected = f"a scenario file, or one of those that come along: {', '.join(found)}"
-        raise ScenarioError(Problem("", MISSING, expected), name)
-    return found[name]
+    return make_scenario(read_source(as_path(path, ScenarioError), report), report)
 
 
 def save_scenario(scenario: Scenario, path: str | Path) -> None:
@@ -159,7 +135,8 @@ def scenario_from_dict(data: Mapping[str, Any], source: str = "scenario", folder
     Raises:
         ScenarioError: with every mistake in the values, one line each.
     """
-    return _make(data, source, Path() if folder is None else as_path(folder, ScenarioError), Report())
+    where = Path() if folder is None else as_path(folder, ScenarioError)
+    return make_scenario(Source(data, source, where), Report())
 
 
 def scenario_to_dict(scenario: Scenario, folder: Path | None = None) -> dict[str, Any]:
@@ -191,23 +168,37 @@ def find_problems(parts: Mapping[str, Any]) -> list[Problem]:
     if robot is not None and world is not None:
         found += _footprint_problems(robot, world)
     if start is not None:
-        found += _start_problems(start, world, robot)
+        found += _start_problems(start, world, robot, parts.get("map"))
     if goal is not None and world is not None:
-        found += _goal_problems(goal, world, robot)
+        found += _goal_problems(goal, world, robot, parts.get("map"))
     if planning is not None:
         found += _horizon_problems(planning)
     return found
 
 
-def _make(data: object, source: str, folder: Path, report: Report) -> Scenario:
-    """Scenario from plain values, or every mistake in them and in what they add up to."""
-    parts = read_parts(data, folder, report)
-    if isinstance(data, Mapping):
-        defaults = {"robot": Robot(), "planning": PlanningSettings()}
-        report.adopt(find_problems({**{k: v for k, v in defaults.items() if k not in data}, **parts}))
+def make_scenario(source: Source, report: Report) -> Scenario:
+    """Scenario from plain values.
+
+    Args:
+        source: what was read.
+        report: with the mistakes of reading it.
+
+    Raises:
+        ScenarioError: with every mistake in the values and in what they add up to.
+    """
+    parts = read_checked(source, report)
     if report.problems:
-        raise ScenarioError(report.problems, source)
+        raise ScenarioError(report.problems, source.name)
     return Scenario(**parts)
+
+
+def read_checked(source: Source, report: Report) -> dict[str, Any]:
+    """Parts of a scenario as far as they can be read, and in the report every mistake in them and in their sum."""
+    parts = read_parts(source.data, source.folder, report)
+    if isinstance(source.data, Mapping):
+        defaults = {"robot": Robot(), "planning": PlanningSettings()}
+        report.adopt(find_problems({**{k: v for k, v in defaults.items() if k not in source.data}, **parts}))
+    return parts
 
 
 def _check_types(scenario: Scenario) -> None:
@@ -237,7 +228,9 @@ def _footprint_problems(robot: Robot, world: World) -> Iterator[Problem]:
         yield Problem("robot.footprint", Remark(f"one {distance:g} m away"), expected)
 
 
-def _start_problems(start: State, world: World | None, robot: Robot | None) -> Iterator[Problem]:
+def _start_problems(
+    start: State, world: World | None, robot: Robot | None, source: MapSource | None
+) -> Iterator[Problem]:
     """Why the robot cannot start from a state."""
     infinite = [name for name, value in start._asdict().items() if not is_number(value, LARGEST)]
     yield from (Problem(f"start.{name}", getattr(start, name), A_NUMBER) for name in infinite)
@@ -250,7 +243,9 @@ def _start_problems(start: State, world: World | None, robot: Robot | None) -> I
     if not world.bounds.contains(start.x, start.y):
         yield Problem("start", [start.x, start.y], _inside(world))
     elif robot is not None and world.collides(robot.footprint, start[:3]):
-        yield Problem("start", list(start[:3]), "a pose where the footprint touches no obstacle and no bound")
+        reason = why_not(world, robot.footprint, start[:3], source)
+        expected = f"a pose where the footprint touches no obstacle and no bound: {reason}"
+        yield Problem("start", list(start[:3]), expected)
 
 
 def _inside(world: World) -> str:
@@ -272,12 +267,14 @@ def _velocity_problems(start: State, limits: Limits) -> Iterator[Problem]:
         yield Problem("start", {"v": start.v, "omega": start.omega}, expected)
 
 
-def _goal_problems(goal: Goal, world: World, robot: Robot | None) -> Iterator[Problem]:
+def _goal_problems(goal: Goal, world: World, robot: Robot | None, source: MapSource | None) -> Iterator[Problem]:
     """Why no state of the goal region can be reached."""
     if not world.bounds.contains(goal.x, goal.y):
         yield Problem("goal", [goal.x, goal.y], _inside(world))
     elif robot is not None and not _may_be_free(goal, world, robot):
-        yield Problem("goal", [goal.x, goal.y], "a region with room for the robot: all of it is in collision")
+        reason = why_not(world, robot.footprint, (goal.x, goal.y, goal.theta or 0.0), source)
+        expected = f"a region with room for the robot: all of it is in collision; at its centre {reason}"
+        yield Problem("goal", [goal.x, goal.y], expected)
 
 
 def _may_be_free(goal: Goal, world: World, robot: Robot) -> bool:

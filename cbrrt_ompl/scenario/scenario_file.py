@@ -3,51 +3,40 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cbrrt_ompl.collision.occupancy import UNKNOWN_CELLS
 from cbrrt_ompl.collision.world import World
-from cbrrt_ompl.errors import MISSING, InputError, Problem
+from cbrrt_ompl.errors import MISSING
 from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, Obstacle, OrientedBox, Polygon
 from cbrrt_ompl.problem.ready_robots import ROBOTS
-from cbrrt_ompl.problem.robot import Footprint, Gains, Limits, Robot
+from cbrrt_ompl.problem.robot import Gains, Limits, Robot
 from cbrrt_ompl.problem.settings import CUT_EXTENSION, NEAREST_NEIGHBOUR, Goal, PlanningSettings, State
+from cbrrt_ompl.scenario.footprints import disc, footprint
+from cbrrt_ompl.scenario.map_layers import load_layers, map_layers, source_data
+from cbrrt_ompl.scenario.nav2 import FOREIGN_KEYS, Nav2Robot, nav2_robot
 from cbrrt_ompl.scenario.sections import (
     Key,
     Report,
     build,
     flag,
+    kind_of,
     list_of,
     number,
     one_of,
     pair_of,
     read_partial,
     read_section,
+    shape_of,
     text,
     whole_number,
 )
 
 if TYPE_CHECKING:
     from cbrrt_ompl.scenario.scenario import Scenario
-
-
-@dataclass(frozen=True)
-class MapSource:
-    """The map that a world was read from, kept so that a scenario is saved with it and not with its obstacles."""
-
-    file: Path
-    """The map's file, absolute."""
-    obstacles: int
-    """How many of the world's obstacles came from it: the first ones."""
-    unknown: str = "occupied"
-    """What unknown cells count as: ``occupied`` or ``free``."""
-    resolution: float | None = None
-    """Side of a cell [m]; None where the map's file tells it."""
 
 
 def read_parts(data: object, folder: Path, report: Report) -> dict[str, Any]:
@@ -61,16 +50,16 @@ def read_parts(data: object, folder: Path, report: Report) -> dict[str, Any]:
     Returns:
         The attributes of a scenario that were given and right; the world also where single obstacles are wrong.
     """
-    report.homes = HOMES
+    report.homes, report.foreign, report.folder = HOMES, FOREIGN_KEYS, folder
     found = read_partial(data, "", SCENARIO, report)
     obstacles: list[Obstacle] = found.pop("obstacles", [])
     bounds: Bounds | None = found.pop("bounds", None)
-    if map_keys := found.pop("map", None):
-        file = folder / map_keys.pop("file")
-        map_bounds, map_obstacles = _load_map(file, report, **map_keys)
-        bounds = bounds or map_bounds
-        found["map"] = MapSource(file.resolve(), len(map_obstacles), **map_keys)
-        obstacles = map_obstacles + obstacles
+    if layers := found.pop("map", None):
+        loaded = load_layers(layers, folder, report)
+        if loaded is not None:
+            found["map"], map_bounds, map_obstacles = loaded
+            bounds = bounds or map_bounds
+            obstacles = map_obstacles + obstacles
     elif isinstance(data, Mapping) and not {"bounds", "map"} & data.keys():
         report.add("bounds", MISSING, "the corners {min: [x, y], max: [x, y]} [m], or a map")
     if bounds is not None:
@@ -95,10 +84,9 @@ def scenario_data(scenario: Scenario, folder: Path) -> dict[str, Any]:
         "obstacles": [_obstacle_data(o) for o in world.obstacles[source.obstacles if source else 0 :]],
     }
     if source is not None:
-        resolution = {} if source.resolution is None else {"resolution": float(source.resolution)}
-        data["map"] = {"file": _relative(source.file, folder), "unknown": source.unknown, **resolution}
+        data["map"] = source_data(source, folder)
     return data | {
-        "robot": _robot_data(scenario.robot),
+        "robot": robot_data(scenario.robot),
         "start": {name: float(value) for name, value in scenario.start._asdict().items()},
         "goal": _goal_data(scenario.goal),
         "planning": _planning_data(scenario.planning),
@@ -120,52 +108,8 @@ def _bounds(value: object, path: str, report: Report) -> Bounds | None:
 def obstacle(value: object, path: str, report: Report) -> Obstacle | None:
     """An obstacle of any type."""
     kinds: dict[str, type] = {"box": Box, "oriented_box": OrientedBox, "disc": Disc, "polygon": Polygon}
-    kind = _kind(value, path, OBSTACLES, report)
-    return None if kind is None else build(kinds[kind], _shape(value, path, OBSTACLES[kind], report), path, report)
-
-
-def _footprint(value: object, path: str, report: Report) -> Footprint | None:
-    makers = {"disc": Footprint.disc, "polygon": Footprint.polygon}
-    kind = _kind(value, path, FOOTPRINTS, report)
-    return None if kind is None else build(makers[kind], _shape(value, path, FOOTPRINTS[kind], report), path, report)
-
-
-def _kind(value: object, path: str, kinds: Mapping[str, Mapping[str, Key]], report: Report) -> str | None:
-    """The type of a shape."""
-    if not isinstance(value, Mapping):
-        report.add(path, value, f"a mapping with a type: {', '.join(kinds)}")
-        return None
-    kind: str | None = one_of(list(kinds))(value.get("type", MISSING), f"{path}.type", report)
-    return kind
-
-
-def _shape(value: object, path: str, keys: Mapping[str, Key], report: Report) -> dict[str, Any] | None:
-    """The values of a shape, without its type."""
-    values = read_section(value, path, {"type": Key(text), **keys}, report)
-    return values and {name: value for name, value in values.items() if name != "type"}
-
-
-def _map(value: object, path: str, report: Report) -> dict[str, Any] | None:
-    section = {"file": value} if isinstance(value, str) else value
-    values = read_section(section, path, MAP, report)
-    return values and {"unknown": "occupied", **values}
-
-
-def _load_map(
-    file: Path, report: Report, unknown: str, resolution: float | None = None
-) -> tuple[Bounds | None, list[Obstacle]]:
-    """Bounds and obstacles of a map; none where it cannot be read."""
-    from cbrrt_ompl.scenario.maps.loading import load_map
-
-    try:
-        loaded = load_map(file, resolution=resolution)
-        return loaded.bounds(), loaded.obstacles(unknown)
-    except InputError as error:
-        where = f"map: {error.source}" if error.source else "map"
-        report.adopt(
-            [Problem(f"{where}: {p.field}" if p.field else where, p.value, p.expected) for p in error.problems]
-        )
-        return None, []
+    kind = kind_of(value, path, OBSTACLES, report)
+    return None if kind is None else build(kinds[kind], shape_of(value, path, OBSTACLES[kind], report), path, report)
 
 
 def _limits(value: object, path: str, report: Report) -> dict[str, Any] | None:
@@ -189,13 +133,22 @@ def _model(value: object, path: str, report: Report) -> Robot | None:
 
 
 def _robot(value: object, path: str, report: Report) -> Robot | None:
-    """A ready robot by its name; or one described in full, or by what differs from a ready one."""
+    """A ready robot by its name; or one described in full, or by what differs from a ready one or from Nav2's."""
     if isinstance(value, str):
         return _model(value, path, report)
     values = read_section(value, path, ROBOT, report)
-    if values is None:
+    if values is None or not isinstance(value, Mapping):
         return None
     model = values.pop("model", Robot())
+    nav2: Nav2Robot | None = values.pop("nav2", None)
+    if nav2 is not None:
+        model = nav2.over(model)
+        report.defaults["goal"] = nav2.goal
+    if "robot_radius" in values:
+        if "footprint" in values:
+            report.add(f"{path}.robot_radius", value["robot_radius"], "either footprint or robot_radius")
+            return None
+        values["footprint"] = values.pop("robot_radius")
     for part in {"limits", "gains"} & values.keys():
         values[part] = getattr(model, part)._replace(**values[part])
     return build(partial(replace, model), values, path, report)
@@ -207,6 +160,9 @@ def _start(value: object, path: str, report: Report) -> State | None:
 
 def _goal(value: object, path: str, report: Report) -> Goal | None:
     values = read_section(value, path, GOAL, report)
+    if values is not None:
+        usual = report.defaults.get("goal", {})
+        values = {name: usual[name] for name in usual if name == "tolerance" or "theta" in values} | values
     if values is not None and "heading_tolerance" in values and "theta" not in values:
         report.add(f"{path}.theta", MISSING, f"the heading that {path}.heading_tolerance is about [rad]")
         return None
@@ -230,15 +186,6 @@ OBSTACLES: dict[str, dict[str, Key]] = {
         "holes": Key(list_of(_corners, "a list of rings, each a list of corners")),
     },
 }
-FOOTPRINTS: dict[str, dict[str, Key]] = {
-    "disc": {"radius": Key(number, required="a radius of 0 or more [m]")},
-    "polygon": {"vertices": Key(_corners, required="a list of corners [[x, y], ...] [m] in the robot's frame")},
-}
-MAP = {
-    "file": Key(text, required="the name of a map's file"),
-    "unknown": Key(one_of(UNKNOWN_CELLS)),
-    "resolution": Key(number),
-}
 LIMITS = {
     "v": Key(_range),
     "omega": Key(_range, is_angle=True),
@@ -249,7 +196,14 @@ LIMITS = {
     "wheel_acceleration": Key(number),
 }
 GAINS = {name: Key(number) for name in Gains._fields}
-ROBOT = {"model": Key(_model), "footprint": Key(_footprint), "limits": Key(_limits), "gains": Key(_gains)}
+ROBOT = {
+    "model": Key(_model),
+    "nav2": Key(nav2_robot),
+    "footprint": Key(footprint),
+    "robot_radius": Key(disc),
+    "limits": Key(_limits),
+    "gains": Key(_gains),
+}
 START = {
     "x": _x,
     "y": _y,
@@ -284,7 +238,7 @@ SCENARIO = {
     "name": Key(text, required="one line of text"),
     "bounds": Key(_bounds),
     "obstacles": Key(list_of(obstacle, "a list of obstacles")),
-    "map": Key(_map),
+    "map": Key(map_layers),
     "robot": Key(_robot),
     "start": Key(_start, required="the state to start in, {x: 0.0, y: 0.0, theta: 0.0} [m, m, rad]"),
     "goal": Key(_goal, required="the goal region, {x: 0.0, y: 0.0, tolerance: 0.5} [m]"),
@@ -317,7 +271,8 @@ def _obstacle_data(obstacle: Obstacle) -> dict[str, Any]:
     return {"type": "polygon", "vertices": obstacle.vertices.tolist(), **holes}
 
 
-def _robot_data(robot: Robot) -> dict[str, Any]:
+def robot_data(robot: Robot) -> dict[str, Any]:
+    """Plain value of a robot, in full."""
     footprint, limits = robot.footprint, robot.limits
     return {
         "footprint": {"type": "disc", "radius": float(footprint.radius)}
@@ -355,11 +310,3 @@ def _planning_data(planning: PlanningSettings) -> dict[str, Any]:
 
 def _floats(values: tuple[float, float]) -> list[float]:
     return [float(value) for value in values]
-
-
-def _relative(file: Path, folder: Path) -> str:
-    """A file's path as seen from a folder, with forward slashes."""
-    try:
-        return Path(os.path.relpath(file, folder)).as_posix()
-    except ValueError:  # another drive
-        return file.as_posix()

@@ -6,6 +6,7 @@ import difflib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
 from cbrrt_ompl.checks import is_number
@@ -26,12 +27,19 @@ class Report:
     Attributes:
         problems: the mistakes.
         homes: the section that a key belongs to, for the message where it stands elsewhere.
+        foreign: what stands here for a key of another program, by its name there.
+        folder: what the names of files are relative to.
+        defaults: values that take the place of keys that are left out, by the section; from a file that another
+            section names.
         degrees: for every angle that was given in degrees, the path of its value in radians, and the path and value
             as written.
     """
 
     problems: list[Problem] = field(default_factory=list)
     homes: Mapping[str, str] = field(default_factory=dict)
+    foreign: Mapping[str, str] = field(default_factory=dict)
+    folder: Path = field(default_factory=Path)
+    defaults: dict[str, dict[str, Any]] = field(default_factory=dict)
     degrees: dict[str, tuple[str, object]] = field(default_factory=dict)
 
     def add(self, path: str, value: object, expected: str) -> None:
@@ -193,6 +201,21 @@ def pair_of(expected: str) -> Converter:
     return pair
 
 
+def kind_of(value: object, path: str, kinds: Mapping[str, Mapping[str, Key]], report: Report) -> str | None:
+    """The type of a shape."""
+    if not isinstance(value, Mapping):
+        report.add(path, value, f"a mapping with a type: {', '.join(kinds)}")
+        return None
+    kind: str | None = one_of(list(kinds))(value.get("type", MISSING), f"{path}.type", report)
+    return kind
+
+
+def shape_of(value: object, path: str, keys: Mapping[str, Key], report: Report) -> dict[str, Any] | None:
+    """The values of a shape, without its type."""
+    values = read_section(value, path, {"type": Key(text), **keys}, report)
+    return values and {name: value for name, value in values.items() if name != "type"}
+
+
 def _read_key(data: Mapping[Any, object], path: str, name: str, key: Key, report: Report) -> Any:
     """Value of one key, or None if it is not there or wrong."""
     spellings = [name, f"{name}_deg"] if key.is_angle else [name]
@@ -222,6 +245,8 @@ def _advice(unknown: object, path: str, keys: Mapping[str, Key], report: Report)
     home = report.homes.get(str(unknown).removesuffix("_deg"), path)
     if home != path:
         return f"it under {home}"
+    if str(unknown) in report.foreign:
+        return report.foreign[str(unknown)]
     close = difflib.get_close_matches(str(unknown), _names(keys), n=1)
     return close[0] if close else f"one of {', '.join(_names(keys))}"
 

@@ -6,8 +6,9 @@ import io
 import json
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -21,9 +22,17 @@ from cbrrt_ompl.problem.settings import MAX_STEPS
 
 if TYPE_CHECKING:
     from cbrrt_ompl.problem.robot import Limits
+    from cbrrt_ompl.scenario.scenario import Scenario
 
 COLUMNS = ("t", "x", "y", "theta", "v", "omega", "v_command", "omega_command")
 """The arrays of a trajectory, in the order of the CSV header."""
+
+EXPORTERS = {
+    ".mcap": "cbrrt_ompl.export.ros_bag.write_bag",
+    ".yaml": "cbrrt_ompl.export.path_yaml.write_path",
+    ".yml": "cbrrt_ompl.export.path_yaml.write_path",
+}
+"""What writes other formats, by the suffix; by name, since the wing of exports lies above this one."""
 
 STANDING_SPEED = 1e-6
 """Forward velocities below this are standing still [m/s]."""
@@ -116,6 +125,11 @@ class Trajectory:
         return float(self.t[-1] - self.t[0])
 
     @property
+    def ends_at_rest(self) -> bool:
+        """Whether the robot stands still at the end."""
+        return float(self.v[-1]) == 0.0 == float(self.omega[-1])
+
+    @property
     def length(self) -> float:
         """Way driven, backwards and forwards alike: the integral of the speed [m]."""
         v0, v1 = self.step_velocities[:2]
@@ -159,7 +173,8 @@ class Trajectory:
         """States at any times, by the trajectory's own model from the row before.
 
         Args:
-            times: times from ``t[0]`` to ``t[-1]``, shape (m,) or a number [s].
+            times: times from ``t[0]`` to ``t[-1]``, shape (m,) or a number [s]; later ones too where the robot is at
+                rest by then, which it stays.
 
         Returns:
             Rows of (x, y, theta, v, omega), shape (m, 5) [m, m, rad, m/s, rad/s]; the stored rows at their times.
@@ -167,22 +182,47 @@ class Trajectory:
         Raises:
             TrajectoryError: if a time is no number, or outside the trajectory.
         """
-        times = _array("times", [times] if is_number(times) else times)
-        outside = ~((times >= self.t[0]) & (times <= self.t[-1]))
+        asked = _array("times", [times] if is_number(times) else times)
+        outside = ~((asked >= self.t[0]) & (asked <= (math.inf if self.ends_at_rest else self.t[-1])))
         if outside.any():
             expected = f"times from {self.t[0]:g} to {self.t[-1]:g} s"
-            raise TrajectoryError(Problem("times", float(times[outside][0]), expected))
-        row = np.searchsorted(self.t, times, side="right") - 1
+            if not self.ends_at_rest:
+                expected += f", where the robot still moves: stopping_at({self.t[-1]:g}) brakes it"
+            raise TrajectoryError(Problem("times", float(asked[outside][0]), expected))
+        asked = np.minimum(asked, self.t[-1])
+        row = np.searchsorted(self.t, asked, side="right") - 1
         states = self.states[row]  # (m, 5)
-        between = times > self.t[row]
+        between = asked > self.t[row]
         row = row[between]
-        elapsed = times[between] - self.t[row]
+        elapsed = asked[between] - self.t[row]
         v0, v1, w0, w1 = self.step_velocities[:, row]
         share = elapsed / (self.t[row + 1] - self.t[row])
         v, omega = v0 + (v1 - v0) * share, w0 + (w1 - w0) * share
         poses = self.poses[row] + displacement(self.theta[row], v0, v, w0, omega, elapsed)
         states[between] = np.column_stack([poses[:, :2], wrapped(poses[:, 2]), v, omega])
         return states
+
+    def resampled(self, hz: float, limits: Limits | None = None) -> Trajectory:
+        """The same motion with rows at a fixed rate, for a controller that runs at that rate.
+
+        Where the rate has a row at every row of this trajectory, the motion is the very same. Else velocities that ramp
+        from row to row at the new rate follow it within the limits, closely (see
+        :mod:`cbrrt_ompl.trajectory.resampling`), and the poses are those that they lead to.
+
+        Args:
+            hz: rows a second [Hz].
+            limits: limits of the robot; those of the trajectory if not given; without any, nothing bounds velocities.
+
+        Returns:
+            Rows at ``t[0]``, ``t[0] + 1 / hz`` and so on; the last step is shorter where the robot still moves at the
+            end, and none is where it comes to rest.
+
+        Raises:
+            TrajectoryError: if the rate is no number above 0, or makes more than a million rows.
+        """
+        from cbrrt_ompl.trajectory.resampling import resample
+
+        return resample(self, hz, self.limits if limits is None else limits)
 
     def stopping_at(self, t: float, limits: Limits | None = None, step: float | None = None) -> Trajectory:
         """Drive on until a time and then brake to rest: v and omega at once, each under its full deceleration.
@@ -245,17 +285,27 @@ class Trajectory:
             raise TrajectoryError(Problem("step", step, expected))
         return np.asarray(states)
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a CSV, NPZ or JSON file, by the suffix; an existing file stays whole until the new one is.
+    def save(self, path: str | os.PathLike[str], scenario: Scenario | None = None) -> None:
+        """Write a file in the format of its suffix; an existing one stays whole until the new one is.
+
+        CSV, NPZ and JSON hold the trajectory number for number. MCAP is a bag of ROS 2 (see
+        :func:`cbrrt_ompl.export.ros_bag.write_bag`; it needs the extra ``ros``), YAML a nav_msgs/Path.
 
         Args:
-            path: the file; CSV has no room for ``kinematic``.
+            path: the file, ``.csv``, ``.npz``, ``.json``, ``.mcap`` or ``.yaml``; CSV has no room for ``kinematic``.
+            scenario: whose map and footprint go into a bag.
 
         Raises:
             TrajectoryError: if the suffix is another one or the file cannot be written.
         """
         path = as_path(path, TrajectoryError)
-        write_file(path, _FORMATS[_suffix(path)].encode(self), TrajectoryError)
+        exporter = EXPORTERS.get(path.suffix.lower())
+        if exporter is not None:
+            module, _, function = exporter.rpartition(".")
+            getattr(import_module(module), function)(self, path, scenario)
+            return
+        known = (*sorted(_FORMATS), *EXPORTERS)
+        write_file(path, _FORMATS[_suffix(path, known)].encode(self), TrajectoryError)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], kinematic: bool = False) -> Trajectory:
@@ -272,7 +322,7 @@ class Trajectory:
             TrajectoryError: if the file is missing, has another suffix or holds no trajectory.
         """
         path = as_path(path, TrajectoryError)
-        decode = _FORMATS[_suffix(path)].decode
+        decode = _FORMATS[_suffix(path, sorted(_FORMATS))].decode
         try:
             content = path.read_bytes()
         except FileNotFoundError:
@@ -361,7 +411,7 @@ def _problems(arrays: Mapping[str, NDArray[np.float64]], place: Callable[[str, i
     return found
 
 
-def _suffix(path: Path) -> str:
+def _suffix(path: Path, known: Iterable[str]) -> str:
     """The suffix in lower case.
 
     Raises:
@@ -369,7 +419,7 @@ def _suffix(path: Path) -> str:
     """
     suffix = path.suffix.lower()
     if suffix not in _FORMATS:
-        raise TrajectoryError(Problem("suffix", path.suffix, f"one of {', '.join(sorted(_FORMATS))}"), str(path))
+        raise TrajectoryError(Problem("suffix", path.suffix, f"one of {', '.join(known)}"), str(path))
     return suffix
 
 

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
-from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.verification.motion import LONGEST_TURN, LONGEST_WAY, Motion
 from cbrrt_ompl.verification.sweep import Sweep
 from cbrrt_ompl.verification.violation import Violation, place
@@ -37,12 +37,12 @@ def collision_violations(sweeps: Mapping[str, Sweep], kept: float) -> Iterator[V
 
 
 def sampling_violations(
-    trajectory: Trajectory, motions: Iterable[Motion], sweeps: Iterable[Sweep]
+    times: NDArray[np.float64], motions: Iterable[Motion], sweeps: Iterable[Sweep]
 ) -> Iterator[Violation]:
     """What could not be checked."""
     where = np.flatnonzero(np.any([motion.left_out for motion in motions], axis=0))
     if len(where):
-        first, last = (float(trajectory.t[row]) for row in where[[0, -1]])
+        first, last = (float(times[row]) for row in where[[0, -1]])
         message = (
             f"sampling: the next row is too far away to be checked at t = {first:.6g} s, "
             f"at most {LONGEST_WAY:g} m and {LONGEST_TURN:.6g} rad from row to row"
@@ -54,4 +54,4 @@ def sampling_violations(
     first = earliest.given_up_at
     if first < math.inf:
         message = f"sampling: {earliest.checks} states do not prove the motion free from t = {first:.6g} s on"
-        yield Violation("sampling", first, message, last_time=float(trajectory.t[-1]))
+        yield Violation("sampling", first, message, last_time=float(times[-1]))

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from cbrrt_ompl.verification.row_checks import START_TOLERANCE
 from cbrrt_ompl.verification.violation import Violation, place
 
+ALL, ROWS, PATH, COLLISIONS = "all", "rows", "path", "collisions"
+"""What was checked: everything; what can be without commands; or without times; or collisions alone."""
+
 
 @dataclass(frozen=True)
 class Verification:
@@ -38,6 +41,8 @@ class Verification:
     """States that FCL was asked about."""
     hint: str = ""
     """What may have gone wrong in the use of the trajectory; empty where nothing comes to mind."""
+    scope: str = ALL
+    """``all``; ``rows`` of a track, which has no commands; ``path`` without times; or ``collisions`` alone."""
 
     @property
     def ok(self) -> bool:
@@ -48,29 +53,48 @@ class Verification:
         """What was checked, to which tolerance, and what failed where and when, a line each."""
         count = len(self.violations)
         verdict = "valid" if self.ok else f"NOT VALID, {count} violation{'s' if count > 1 else ''}"
-        accelerations = (
-            "accelerations not checked: the trajectory is kinematic, its velocities may jump"
-            if self.kinematic
-            else "velocities, commands and accelerations within the limits"
-        )
         bound = (
             f"proven not to fall below {self.clearance_bound:.4g} m"
             if self.clearance_bound > 0.0
             else "not proven to be above 0 everywhere"
         )
+        again = ", stored and integrated again," if self.scope == ALL else ""
         lines = [
             f"trajectory of {self.rows} rows, {self.duration:g} s: {verdict}",
             *(f"  {violation.message}" for violation in self.violations),
             *([f"  hint: {self.hint}"] if self.hint else []),
             "checked:",
-            f"  first row at the start to {START_TOLERANCE:g}; last row in the goal region",
-            *(["  velocities and commands within the limits"] if self.kinematic else []),
-            f"  {accelerations}",
-            f"  motion integrated again from the commands, to {self.tolerance:g} (m, rad, m/s, rad/s) at every row",
-            "  no collision of the motion, stored and integrated again, at any time: by the clearance that FCL finds",
+            *(f"  {line}" for line in self._checked()),
+            f"  no collision of the motion{again} at any time: by the clearance that FCL finds",
             f"  at {self.checks} states and the way between them; "
             f"intervals of at most {self.resolution:g} m accepted for their free ends: {self.unproven}",
             f"smallest clearance: {self.smallest_clearance:.4g} m at t = {self.smallest_clearance_time:.6g} s, "
             f"at {place(self.smallest_clearance_pose)}; {bound}",
         ]
         return "\n".join(lines)
+
+    def _checked(self) -> list[str]:
+        """What was checked besides collisions, a line each."""
+        accelerations = (
+            "accelerations not checked: the trajectory is kinematic, its velocities may jump"
+            if self.kinematic
+            else "velocities, commands and accelerations within the limits"
+        )
+        if self.scope == ALL:
+            return [
+                f"first row at the start to {START_TOLERANCE:g}; last row in the goal region",
+                *(["velocities and commands within the limits"] if self.kinematic else []),
+                accelerations,
+                f"motion integrated again from the commands, to {self.tolerance:g} (m, rad, m/s, rad/s) at every row",
+            ]
+        if self.scope == COLLISIONS:
+            return []
+        ends = f"first row at the start to {self.tolerance:g}; last row in the goal region"
+        if self.scope == PATH:
+            return [ends, "no velocities: the path has no times"]
+        return [
+            ends,
+            f"velocities within the limits, to {self.tolerance:g}",
+            accelerations.replace(", commands", "") + ("" if self.kinematic else f", to {self.tolerance:g}"),
+            f"every row where the one before leads, to {self.tolerance:g} (m, rad); no commands to integrate again",
+        ]

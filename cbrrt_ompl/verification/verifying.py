@@ -8,6 +8,7 @@ import numpy as np
 
 from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.errors import Problem, SettingsError, TrajectoryError
+from cbrrt_ompl.trajectory.track import Track
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.verification.collision_checks import collision_violations, sampling_violations
 from cbrrt_ompl.verification.distances import Distances
@@ -22,6 +23,7 @@ from cbrrt_ompl.verification.motion import Motion
 from cbrrt_ompl.verification.result import Verification
 from cbrrt_ompl.verification.row_checks import goal_violations, motion_violations, start_violations
 from cbrrt_ompl.verification.sweep import sweep
+from cbrrt_ompl.verification.track_verifying import verify_rows
 from cbrrt_ompl.verification.velocities import velocities_again
 
 if TYPE_CHECKING:
@@ -37,7 +39,12 @@ KINEMATIC_HINT = (
 
 
 def verify(
-    trajectory: Trajectory, scenario: Scenario, *, tolerance: float = 1e-3, resolution: float = RESOLUTION
+    trajectory: Trajectory | Track,
+    scenario: Scenario,
+    *,
+    tolerance: float = 1e-3,
+    resolution: float = RESOLUTION,
+    collisions_only: bool = False,
 ) -> Verification:
     """Check a trajectory against everything that its scenario asks for.
 
@@ -50,6 +57,11 @@ def verify(
     they exceed a bound on the way of any point of the footprint; else the interval is halved, until no point moves more
     than ``resolution`` in it.
 
+    What others planned or recorded has no commands (a :class:`Track`). Its motion goes from row to row by the
+    velocities of the rows, or along arcs where there are none, and every row has to lie where the one before leads;
+    velocities, accelerations and the start may be off by the tolerance. A path without times has only its start and
+    its goal checked besides collisions.
+
     Args:
         trajectory: what is to be checked.
         scenario: world, robot, start and goal.
@@ -57,6 +69,7 @@ def verify(
             v [m/s] and omega [rad/s].
         resolution: way of any point of the footprint down to which an interval is proven [m]; a shorter one is accepted
             if its ends are free.
+        collisions_only: check nothing but collisions.
 
     Returns:
         The violations found, and the smallest clearance.
@@ -69,11 +82,13 @@ def verify(
     from cbrrt_ompl.scenario.scenario import check_scenario
 
     check_scenario(scenario)
-    if not isinstance(trajectory, Trajectory):
-        raise TrajectoryError(Problem("trajectory", trajectory, "a value of type Trajectory"))
+    if not isinstance(trajectory, Trajectory | Track):
+        raise TrajectoryError(Problem("trajectory", trajectory, "a value of type Trajectory, or a Track"))
     for name, value in (("tolerance", tolerance), ("resolution", resolution)):
         if not (is_number(value) and value > 0.0):
             raise SettingsError(Problem(name, value, "a number above 0"))
+    if collisions_only or isinstance(trajectory, Track):
+        return verify_rows(trajectory, scenario, tolerance, resolution, collisions_only)
     footprint = scenario.robot.footprint
     distances = Distances(scenario.world, footprint)
     kept = max(scenario.planning.clearance - resolution, 0.0)
@@ -97,7 +112,7 @@ def verify(
             *accelerations,
             *motion_violations(trajectory, states, tolerance),
             *collision_violations(sweeps, kept),
-            *sampling_violations(trajectory, motions.values(), sweeps.values()),
+            *sampling_violations(trajectory.t, motions.values(), sweeps.values()),
             *goal_violations(trajectory, scenario),
         )
         nearest = min(sweeps.values(), key=lambda sweep: sweep.smallest_margin)

@@ -24,11 +24,11 @@ class Reading(NamedTuple):
     mode: str = "trinary"
     """One of ``MODES``."""
     negate: bool = False
-    """Whether bright pixels are the occupied ones."""
+    """Whether bright pixels are the occupied ones; without meaning in ``raw``."""
     occupied_thresh: float = OCCUPIED_THRESHOLD
-    """Pixels more likely occupied than this are occupied."""
+    """Pixels at least as likely occupied as this are occupied; without meaning in ``raw``."""
     free_thresh: float = FREE_THRESHOLD
-    """Pixels less likely occupied than this are free."""
+    """Pixels at most as likely occupied as this are free; without meaning in ``raw``."""
 
 
 def read_image(path: Path) -> NDArray[np.int8]:
@@ -43,24 +43,28 @@ def read_image(path: Path) -> NDArray[np.int8]:
     Raises:
         MapError: if it cannot be read.
     """
-    pixels = read_pixels(path)
-    cells = cells_of(pixels._replace(alpha=None), Reading())
-    if pixels.alpha is not None:
-        cells[pixels.alpha[::-1] != 255] = UNKNOWN
-    return cells
+    return cells_of(read_pixels(path), Reading())
 
 
 def cells_of(pixels: Pixels, reading: Reading) -> NDArray[np.int8]:
-    """Cells as nav2_map_server makes them, those between the thresholds unknown in every mode.
+    """Cells as nav2_map_server and the static layer of a trinary costmap make them.
 
-    - ``trinary``: alpha counts as one more channel of the brightness, a grey 1 - p is occupied with likelihood p.
-    - ``scale``: the same of the colours alone, and what is not opaque is unknown.
-    - ``raw``: the brightness from 0 to 255 is the number of ROS, percent up to 100 and unknown above; ``negate`` and
-      alpha have no meaning.
+    A pixel of brightness p from 0 to 1, the mean of its colours, is occupied with likelihood 1 - p, or p where
+    ``negate`` is set.
+
+    - ``trinary``: occupied from ``occupied_thresh`` on, free up to ``free_thresh``, both included, unknown between
+      them. What is not opaque is unknown.
+    - ``scale``: the same, but what lies between the thresholds is a number of percent on the way from one to the other,
+      and less than 100 of them are free to the costmap.
+    - ``raw``: the brightness from 0 to 255 is the number of ROS: 100 is occupied, less is free, more is unknown.
+      ``negate``, the thresholds and alpha have no meaning.
 
     Note:
         map_saver writes unknown cells as grey 205 of 255, which is free under the ``free_thresh`` of 0.25 that nav2
         writes beside it. Here that very grey is unknown whatever the threshold, in a trinary map that is not negated.
+
+        Older versions of nav2_map_server (up to Jazzy) left the borders out, and took alpha for a fourth colour in
+        trinary maps, where opaque dark grey became unknown.
 
     Args:
         pixels: the image.
@@ -70,28 +74,31 @@ def cells_of(pixels: Pixels, reading: Reading) -> NDArray[np.int8]:
         ``OCCUPIED``, ``FREE`` or ``UNKNOWN``, the lowest row first, shape (rows, columns).
     """
     sums, peak, alpha = pixels
-    unknown_sum = UNKNOWN_GREY * (peak // 255)
-    cells = None
-    if reading.mode == "trinary" and alpha is not None:
-        four_channels = sums + alpha  # a sum of three channels and alpha stays below 2^16
-        cells = _likelihood_cells(peak + 255, reading)[four_channels]
-    else:
-        cells = _likelihood_cells(peak, reading)[sums]
+    if reading.mode == "raw":
+        return _raw_cells(peak)[sums][::-1]
+    cells = _likelihood_cells(peak, reading)[sums]
     if reading.mode == "trinary" and not reading.negate:
-        cells[sums == unknown_sum] = UNKNOWN
-    if reading.mode == "scale" and alpha is not None:
+        cells[sums == UNKNOWN_GREY * (peak // 255)] = UNKNOWN
+    if alpha is not None:
         cells[alpha != 255] = UNKNOWN
     return cells[::-1]
 
 
 def _likelihood_cells(peak: int, reading: Reading) -> NDArray[np.int8]:
-    """Cell for every brightness from 0 to a peak, shape (peak + 1,)."""
-    shade = np.arange(peak + 1) / peak
-    likelihood = shade if reading.negate else 1.0 - shade
-    if reading.mode == "raw":
-        percent = np.round(255.0 * shade)
-        likelihood = np.where(percent <= 100.0, percent / 100.0, np.nan)
+    """Cell for every brightness from 0 to a peak, shape (peak + 1,), in the single precision of nav2_map_server."""
+    shade = np.arange(peak + 1, dtype=np.float32) / np.float32(peak)
+    likelihood = shade if reading.negate else np.float32(1.0) - shade
+    occupied, free = np.float32(reading.occupied_thresh), np.float32(reading.free_thresh)
     cells = np.full(peak + 1, UNKNOWN, dtype=np.int8)
-    cells[likelihood > reading.occupied_thresh] = OCCUPIED
-    cells[likelihood < reading.free_thresh] = FREE
+    if reading.mode == "scale" and occupied > free:
+        percent = np.float32(100.0) * ((likelihood - free) / (occupied - free))
+        cells[:] = np.where(np.floor(percent + np.float32(0.5)) < OCCUPIED, FREE, OCCUPIED)
+    cells[likelihood >= occupied] = OCCUPIED
+    cells[likelihood <= free] = FREE
     return cells
+
+
+def _raw_cells(peak: int) -> NDArray[np.int8]:
+    """Cell for every brightness from 0 to a peak where it is the number of ROS, shape (peak + 1,)."""
+    number = np.round(255.0 * np.arange(peak + 1) / peak)
+    return np.select([number < OCCUPIED, number == OCCUPIED], [FREE, OCCUPIED], UNKNOWN).astype(np.int8)

@@ -9,13 +9,10 @@ from cbrrt_ompl.collision.occupancy import OCCUPIED
 from cbrrt_ompl.errors import MISSING, MapError, Problem, Remark
 from cbrrt_ompl.files import as_path
 from cbrrt_ompl.scenario.maps.image import read_image
+from cbrrt_ompl.scenario.maps.map_files import IMAGE_SUFFIXES, MOVINGAI_SUFFIX, ROS_SUFFIXES
 from cbrrt_ompl.scenario.maps.map_server import read_map_server
 from cbrrt_ompl.scenario.maps.movingai import read_movingai
 from cbrrt_ompl.scenario.maps.occupancy_map import OccupancyMap
-
-ROS_SUFFIXES = (".yaml", ".yml")
-IMAGE_SUFFIXES = (".bmp", ".gif", ".jpeg", ".jpg", ".pbm", ".pgm", ".png", ".ppm")
-MOVINGAI_SUFFIX = ".map"
 
 
 def load_map(
@@ -24,16 +21,18 @@ def load_map(
     resolution: float | None = None,
     origin: Sequence[float] | None = None,
     unknown: str = "occupied",
+    may_be_full: bool = False,
 ) -> OccupancyMap:
     """Map from a file.
 
     Args:
-        path: a ROS map_server map (``.yaml``), an image (``.png``, ``.pgm``, ``.bmp`` and others; dark is occupied), or
-            a MovingAI map (``.map``).
+        path: a ROS map_server map (``.yaml``), an image (``.png``, ``.pgm``, ``.bmp``, ``.tif`` and others; dark is
+            occupied), or a MovingAI map (``.map``).
         resolution: side of a cell [m]; needed but for ROS maps, whose own it replaces.
         origin: pose (x, y, yaw) of the lower left corner of the map, [m, m, rad]; that of a ROS map, or zero, if not
             given.
         unknown: whether unknown cells will count as ``occupied`` or ``free``.
+        may_be_full: accept a map without any free cell, as a mask over another one may be.
 
     Returns:
         The map.
@@ -43,8 +42,9 @@ def load_map(
     """
     path = as_path(path, MapError)
     suffix = path.suffix.lower()
+    remarks: tuple[str, ...] = ()
     if suffix in ROS_SUFFIXES:
-        cells, own_resolution, own_origin = read_map_server(path)
+        cells, own_resolution, own_origin, remarks = read_map_server(path)
         resolution = own_resolution if resolution is None else resolution
         origin = own_origin if origin is None else origin
     elif suffix != MOVINGAI_SUFFIX and suffix not in IMAGE_SUFFIXES:
@@ -57,7 +57,7 @@ def load_map(
     else:
         cells = read_movingai(path) if suffix == MOVINGAI_SUFFIX else read_image(path)
     pose = (0.0, 0.0, 0.0) if origin is None else origin
-    found = OccupancyMap(cells, resolution, pose, unknown, str(path))  # type: ignore[arg-type]  # checked in there
-    if (found.cells == OCCUPIED).all():
+    found = OccupancyMap(cells, resolution, pose, unknown, str(path), remarks)  # type: ignore[arg-type]  # checked
+    if not may_be_full and (found.cells == OCCUPIED).all():
         raise MapError(Problem("cells", Remark("only occupied ones"), "a free one"), str(path))
     return found

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import glob
+import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,7 @@ from cbrrt_ompl.collision.occupancy import FREE, FREE_THRESHOLD, OCCUPIED, OCCUP
 from cbrrt_ompl.errors import MISSING, InputError, MapError, Problem
 from cbrrt_ompl.files import write_files
 from cbrrt_ompl.scenario.maps.image import MODES, UNKNOWN_GREY, Reading, cells_of
+from cbrrt_ompl.scenario.maps.map_files import IMAGE_SUFFIXES, find_beside
 from cbrrt_ompl.scenario.maps.pixels import read_pixels
 from cbrrt_ompl.scenario.plain_yaml import dump_line, read_yaml
 
@@ -24,17 +27,30 @@ _GREYS = {OCCUPIED: 0, FREE: 254, UNKNOWN: UNKNOWN_GREY}
 """What map_saver writes."""
 
 
-def read_map_server(path: Path) -> tuple[NDArray[np.int8], float, tuple[float, float, float]]:
+class MapServerMap(NamedTuple):
+    """What a map_server file holds."""
+
+    cells: NDArray[np.int8]
+    """The lowest row first, shape (rows, columns)."""
+    resolution: float
+    """Side of a cell [m]."""
+    origin: tuple[float, float, float]
+    """Pose (x, y, yaw) of the lower left corner [m, m, rad]."""
+    remarks: tuple[str, ...]
+    """What was not taken as it was written, a line each."""
+
+
+def read_map_server(path: Path) -> MapServerMap:
     """Cells, resolution and origin of a ROS map.
 
     Required are ``image``, ``resolution`` and ``origin``. Where they are left out, ``mode`` is ``trinary``, ``negate``
     0, ``occupied_thresh`` 0.65 and ``free_thresh`` 0.196. Other keys are skipped.
 
+    The image is looked for where the file says: relative to the YAML file, absolute, or under the home folder (``~``);
+    and, for files that came from another machine, by its name beside the YAML file, with a remark.
+
     Args:
         path: the YAML file.
-
-    Returns:
-        Cells, the lowest row first, shape (rows, columns); side of a cell [m]; origin (x, y, yaw) [m, m, rad].
 
     Raises:
         MapError: with every mistake in the YAML file, or with why its image cannot be read.
@@ -47,13 +63,14 @@ def read_map_server(path: Path) -> tuple[NDArray[np.int8], float, tuple[float, f
     if not isinstance(data, Mapping):
         problem = Problem("", data, "a mapping with the keys image, resolution, origin")
         raise MapError(problem, str(path))
-    image = _image(data, path, problems)
+    remarks: list[str] = []
+    image = _image(data, path, problems, remarks)
     resolution = _resolution(data, problems)
     origin = _origin(data, problems)
     reading = _reading(data, problems)
     if problems or image is None or resolution is None or origin is None:
         raise MapError(problems, str(path))
-    return cells_of(read_pixels(image), reading), resolution, origin
+    return MapServerMap(cells_of(read_pixels(image), reading), resolution, origin, tuple(remarks))
 
 
 def write_map_server(grid: OccupancyMap, path: Path) -> None:
@@ -79,20 +96,24 @@ def write_map_server(grid: OccupancyMap, path: Path) -> None:
     write_files({image: pixels, path: lines}, MapError)
 
 
-def _image(data: Mapping[object, object], path: Path, problems: list[Problem]) -> Path | None:
-    """The image file, looked for beside the YAML file."""
+def _image(data: Mapping[object, object], path: Path, problems: list[Problem], remarks: list[str]) -> Path | None:
+    """The image file, looked for where the YAML file says and then beside it."""
     name = data.get("image", MISSING)
     if not isinstance(name, str) or not name.strip():
         problems.append(Problem("image", name, "the name of an image file"))
         return None
-    image = path.parent / name
-    try:
-        if image.is_file():
-            return image
-    except (OSError, ValueError):
-        pass
-    problems.append(Problem("image", name, f"a file that exists, looked for in {path.parent}"))
+    image, remark = find_beside(name, path.parent)
+    if image is not None:
+        remarks += [f"{path}: image: {remark}"] if remark else []
+        return image
+    others = [file.name for file in sorted(path.parent.glob(f"{glob.escape(path.stem)}.*")) if _is_image(file)]
+    hint = f" ({others[0]} lies there: write image: {others[0]})" if others else ""
+    problems.append(Problem("image", name, f"a file that exists, looked for as {remark}{hint}"))
     return None
+
+
+def _is_image(file: Path) -> bool:
+    return file.suffix.lower() in IMAGE_SUFFIXES
 
 
 def _resolution(data: Mapping[object, object], problems: list[Problem]) -> float | None:
@@ -108,13 +129,25 @@ def _origin(data: Mapping[object, object], problems: list[Problem]) -> tuple[flo
     if isinstance(value, list) and len(value) == 3 and all(is_number(entry) for entry in value):
         x, y, yaw = value
         return float(x), float(y), float(yaw)
+    if isinstance(value, list) and len(value) == 3 and all(map(is_number, value[:2])) and _is_nan(value[2]):
+        expected = "a yaw that is a number; map_saver writes this for a SLAM that sends no rotation: write 0.0 there"
+        problems.append(Problem("origin", value, expected))
+        return None
     problems.append(Problem("origin", value, "three finite numbers [x, y, yaw] [m, m, rad]"))
     return None
+
+
+def _is_nan(value: object) -> bool:
+    """Whether a value is no number, in YAML's own notation or in that of C."""
+    if isinstance(value, str):
+        return value.lower().lstrip("+-").startswith("nan")
+    return isinstance(value, float) and math.isnan(value)
 
 
 def _reading(data: Mapping[object, object], problems: list[Problem]) -> Reading:
     """How the image is to be read; the defaults where the file is wrong."""
     mode = data.get("mode", "trinary")
+    mode = mode.lower() if isinstance(mode, str) else mode
     if mode not in MODES:
         problems.append(Problem("mode", mode, f"one of {', '.join(MODES)}"))
     negate = data.get("negate", 0)

@@ -51,6 +51,8 @@ class OccupancyMap:
     """What unknown cells count as where nothing else is said: ``occupied`` or ``free``."""
     source: str = ""
     """The file that it came from."""
+    remarks: tuple[str, ...] = ()
+    """What was not taken as its file says, a line each."""
 
     def __post_init__(self) -> None:
         """Check and freeze everything."""

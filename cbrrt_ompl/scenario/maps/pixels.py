@@ -12,8 +12,9 @@ from PIL import Image
 
 from cbrrt_ompl.collision.occupancy import check_cell_count
 from cbrrt_ompl.errors import MapError, Problem, Remark
+from cbrrt_ompl.scenario.maps.pnm import open_straight
 
-FORMATS = ("PNG", "PPM", "BMP", "JPEG", "GIF")
+FORMATS = ("PNG", "PPM", "BMP", "JPEG", "GIF", "TIFF")
 """Formats that are read, by Pillow's names; PPM stands for PGM and PBM as well."""
 
 _CELLS_PER_BYTE = 8300
@@ -35,7 +36,8 @@ def read_pixels(path: Path) -> Pixels:
     """Brightness and opacity of the pixels of an image file.
 
     Args:
-        path: a PGM, PNG, BMP, JPEG or GIF file: grey, RGB or of a palette, of 1, 8 or 16 bits, with alpha or without.
+        path: a PGM, PNG, BMP, JPEG, GIF or TIFF file: grey, RGB or of a palette, of 1, 8 or 16 bits, with alpha or
+            without.
 
     Raises:
         MapError: if there is no such file, or it is no such image, too large or cut off.
@@ -44,7 +46,7 @@ def read_pixels(path: Path) -> Pixels:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # Pillow warns of large images, which are checked here
-            with Image.open(path, formats=FORMATS) as image:
+            with open_straight(path) as file, Image.open(file, formats=FORMATS) as image:
                 check_cell_count((image.height, image.width), "image")
                 if image.width * image.height > _CELLS_PER_BYTE * path.stat().st_size:
                     raise _unreadable(source, "the file is shorter than its header says")
@@ -79,4 +81,4 @@ def _pixels(image: Any, source: str) -> Pixels:
 
 
 def _unreadable(source: str, reason: str) -> MapError:
-    return MapError(Problem("", Remark(reason), "a whole image: PGM, PNG, BMP, JPEG or GIF"), source)
+    return MapError(Problem("", Remark(reason), "a whole image: PGM, PNG, BMP, JPEG, GIF or TIFF"), source)
