@@ -1,0 +1,71 @@
+"""What an optimised motion is checked by: the only place of this wing that knows how collision is decided."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cbrrt_ompl.collision.clearance_map import ROOM, clearance_map_for
+from cbrrt_ompl.collision.motion_check import is_free
+from cbrrt_ompl.motion.kinematics import brake
+from cbrrt_ompl.optimise.cover import cover
+from cbrrt_ompl.optimise.field import distance_at, field_of
+from cbrrt_ompl.optimise.kernels import Record, kernel
+from cbrrt_ompl.problem.settings import MAX_STEPS
+from cbrrt_ompl.scenario.scenario import Scenario
+
+
+def least_clearance(scenario: Scenario) -> float:
+    """Distance that the motions of a scenario keep from everything [m]."""
+    return max(getattr(scenario.planning, "clearance", 0.0), ROOM)
+
+
+def is_motion_free(states: NDArray[np.float64], dt: float, scenario: Scenario) -> bool:
+    """Whether the planners would accept a motion.
+
+    Args:
+        states: rows of (x, y, theta, v, omega), shape (n, 5); between the rows the velocities are linear in time.
+        dt: time between two rows [s].
+        scenario: world and footprint.
+    """
+    return is_free(states, dt, clearance_map_for(scenario.world, scenario.robot.footprint))
+
+
+def unsafe_rows(states: NDArray[np.float64], scenario: Scenario) -> NDArray[np.bool_]:
+    """From which states the robot cannot brake to rest without collision, shape (n,)."""
+    step = scenario.planning.step
+    found = np.zeros(len(states), dtype=np.bool_)
+    for row, (x, y, theta, v, omega) in enumerate(states.tolist()):
+        braking = brake(x, y, theta, v, omega, scenario.robot.limits, step, MAX_STEPS)
+        found[row] = not is_motion_free(braking, step, scenario)
+    return found
+
+
+def disc_distances(poses: NDArray[np.float64], scenario: Scenario) -> NDArray[np.float64]:
+    """Distances of the discs that stand for the footprint, by the distance field, shape (n, discs) [m].
+
+    Args:
+        poses: rows that begin with (x, y, theta), shape (n, 3) or more [m, m, rad].
+        scenario: world and footprint.
+    """
+    grid, distances = field_of(scenario.world)
+    discs = cover(scenario.robot.footprint)
+    found: NDArray[np.float64] = disc_distances_in(grid, distances, discs, np.ascontiguousarray(poses))
+    return found
+
+
+@kernel
+def disc_distances_in(
+    grid: Record, distances: NDArray[np.float32], discs: NDArray[np.float64], poses: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Distances of discs from everything at poses, shape (n, discs) [m]."""
+    found = np.empty((len(poses), len(discs)))
+    for k in range(len(poses)):
+        cosine, sine = math.cos(poses[k, 2]), math.sin(poses[k, 2])
+        for i in range(len(discs)):
+            x = poses[k, 0] + cosine * discs[i, 0] - sine * discs[i, 1]
+            y = poses[k, 1] + sine * discs[i, 0] + cosine * discs[i, 1]
+            found[k, i] = distance_at(grid, distances, x, y) - discs[i, 2]
+    return found
