@@ -270,7 +270,7 @@ def distance_at(grid: Record, distances: NDArray[np.float32], x: float, y: float
     return found
 
 
-@inner_kernel
+@kernel
 def distance_and_gradient(
     grid: Record, distances: NDArray[np.float32], x: float, y: float
 ) -> tuple[float, float, float]:
