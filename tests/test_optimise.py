@@ -46,6 +46,7 @@ CASES: dict[str, dict[str, Any]] = {
     },
     "a moving start": {"robot": BOX_ROBOT, "start": State(1.0, 1.0, 0.5, -0.3, 0.4)},
     "able to brake": {"planning": PlanningSettings(brake_safe=True)},
+    "clearance": {"robot": BOX_ROBOT, "planning": PlanningSettings(clearance=0.1)},
 }
 
 
@@ -78,6 +79,13 @@ def test_an_improved_trajectory_is_much_shorter_than_a_plan(improved: tuple[Scen
 def test_verify_accepts_an_improved_trajectory(improved: tuple[Scenario, Trajectory, Trajectory]) -> None:
     scenario, _, better = improved
     assert verify(better, scenario).violations == ()
+
+
+@pytest.mark.slow
+def test_the_clearance_asked_for_is_kept(improved: tuple[Scenario, Trajectory, Trajectory]) -> None:
+    scenario, _, better = improved
+    least = min(scenario.world.clearance(scenario.robot.footprint, pose) for pose in better.poses)
+    assert least >= max(scenario.planning.clearance, 5e-4)
 
 
 @pytest.mark.slow

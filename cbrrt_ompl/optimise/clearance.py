@@ -7,19 +7,21 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.collision.clearance_map import ROOM, clearance_map_for
+from cbrrt_ompl.collision.clearance import clearances_at
 from cbrrt_ompl.collision.motion_check import is_free
 from cbrrt_ompl.motion.kinematics import brake
+from cbrrt_ompl.motion.model import motion_room
+from cbrrt_ompl.motion.records import Record
 from cbrrt_ompl.optimise.cover import cover
 from cbrrt_ompl.optimise.field import distance_at, field_of
-from cbrrt_ompl.optimise.kernels import Record, kernel
+from cbrrt_ompl.optimise.kernels import kernel
 from cbrrt_ompl.problem.settings import MAX_STEPS
 from cbrrt_ompl.scenario.scenario import Scenario
 
 
 def least_clearance(scenario: Scenario) -> float:
     """Distance that the motions of a scenario keep from everything [m]."""
-    return max(getattr(scenario.planning, "clearance", 0.0), ROOM)
+    return motion_room(scenario.planning.clearance)
 
 
 def is_motion_free(states: NDArray[np.float64], dt: float, scenario: Scenario) -> bool:
@@ -30,7 +32,20 @@ def is_motion_free(states: NDArray[np.float64], dt: float, scenario: Scenario) -
         dt: time between two rows [s].
         scenario: world and footprint.
     """
-    return is_free(states, dt, clearance_map_for(scenario.world, scenario.robot.footprint))
+    return is_free(states, dt, scenario.world.scene(scenario.robot.footprint), least_clearance(scenario))
+
+
+def clearances(states: NDArray[np.float64], scenario: Scenario) -> NDArray[np.float64]:
+    """Exact distances of the footprint from everything, below 0 where it touches something, shape (n,) [m].
+
+    Args:
+        states: rows that begin with (x, y, theta), shape (n, 3) or more [m, m, rad].
+        scenario: world and footprint.
+    """
+    found: NDArray[np.float64] = clearances_at(
+        scenario.world.scene(scenario.robot.footprint), np.ascontiguousarray(states)
+    )
+    return found
 
 
 def unsafe_rows(states: NDArray[np.float64], scenario: Scenario) -> NDArray[np.bool_]:

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cbrrt_ompl.collision.distances import point_piece
-from cbrrt_ompl.collision.pieces import DISC, obstacle_pieces
+from cbrrt_ompl.collision.pieces import DISC
 from cbrrt_ompl.collision.world import World
-from cbrrt_ompl.optimise.kernels import Record, inner_kernel, kernel
+from cbrrt_ompl.motion.records import Record, Records, record_array
+from cbrrt_ompl.optimise.kernels import inner_kernel, kernel
 
 LARGEST_SPACING, SMALLEST_SPACING = 0.05, 0.01
 """Range of the distance between two nodes [m], as far as `MAX_NODES` allows."""
@@ -68,7 +69,7 @@ def make_field(world: World) -> Field:
 
     Pieces thinner than the spacing are thickened to it: no wall, however thin, is lost between two nodes.
     """
-    pieces, corners = obstacle_pieces(dict.fromkeys(world.obstacles))
+    pieces, corners = world.pieces.pieces.copy(), world.pieces.corners
     half = np.minimum(pieces["half_x"], pieces["half_y"])[pieces["kind"] <= DISC]
     spacing = _spacing(world, 2.0 * float(half.min(initial=math.inf)))
     pieces["half_x"], pieces["half_y"] = (np.maximum(pieces[name], 0.5 * spacing) for name in ("half_x", "half_y"))
@@ -76,7 +77,8 @@ def make_field(world: World) -> Field:
     shape = tuple(math.ceil(size / spacing - 1e-9) + 1 + 2 * BORDER for size in (height, width))
     distances = np.empty(shape, dtype=np.float32)
     x_min, y_min = (low - BORDER * spacing for low in world.bounds.min)
-    grid = np.array([(x_min, y_min, spacing)], dtype=GRID)[0]
+    grid = record_array(1, GRID)[0]
+    grid["x_min"], grid["y_min"], grid["spacing"] = x_min, y_min, spacing
     fill_distances(grid, distances, pieces, corners)
     if len(pieces) > 1:
         deepen_inside(distances, np.where(distances > 0.0, 0.0, np.inf).astype(np.float32), spacing)
@@ -105,9 +107,7 @@ def _add_bounds(grid: Record, distances: NDArray[np.float32], world: World) -> N
 
 
 @kernel
-def fill_distances(
-    grid: Record, distances: NDArray[np.float32], pieces: NDArray[np.void], corners: NDArray[np.void]
-) -> None:
+def fill_distances(grid: Record, distances: NDArray[np.float32], pieces: Records, corners: Records) -> None:
     """Exact signed distances from the nearest piece at all nodes; infinite where there is none.
 
     A signed distance is 1-Lipschitz: in a tile whose nodes lie within r of its centre c, the nearest piece is one whose
@@ -134,7 +134,7 @@ def fill_distances(
 
 
 @inner_kernel
-def piece_distance(x: float, y: float, piece: Record, corners: NDArray[np.void]) -> float:
+def piece_distance(x: float, y: float, piece: Record, corners: Records) -> float:
     """:func:`cbrrt_ompl.collision.distances.point_piece`, compiled once for both of its callers here."""
     return point_piece(x, y, piece, corners)
 
@@ -146,8 +146,8 @@ def shortlist(
     column: int,
     side: int,
     grid: Record,
-    pieces: NDArray[np.void],
-    corners: NDArray[np.void],
+    pieces: Records,
+    corners: Records,
     lists: NDArray[np.int32],
     counts: NDArray[np.int64],
     from_centre: NDArray[np.float64],
@@ -173,8 +173,8 @@ def fill_tile(
     column: int,
     grid: Record,
     distances: NDArray[np.float32],
-    pieces: NDArray[np.void],
-    corners: NDArray[np.void],
+    pieces: Records,
+    corners: Records,
     nearest: NDArray[np.int32],
     count: int,
 ) -> None:

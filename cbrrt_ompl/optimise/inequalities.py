@@ -11,8 +11,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from cbrrt_ompl.motion.records import Record, Records
 from cbrrt_ompl.optimise.field import distance_and_gradient, distance_at
-from cbrrt_ompl.optimise.kernels import Record, inner_kernel
+from cbrrt_ompl.optimise.kernels import inner_kernel
 from cbrrt_ompl.optimise.program import (
     CONTROL_ROWS,
     OMEGA,
@@ -26,7 +27,7 @@ from cbrrt_ompl.optimise.program import (
 )
 
 
-def lay_out_rows(problem: Record, stages: NDArray[np.void]) -> None:
+def lay_out_rows(problem: Record, stages: Records) -> None:
     """Count the inequalities of every stage, and write the derivatives of those that are linear: they never change.
 
     The start is given, so that only its control is restricted.

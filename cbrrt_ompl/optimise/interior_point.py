@@ -19,10 +19,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from cbrrt_ompl.motion.records import Record, Records
 from cbrrt_ompl.optimise.costs import add_cost_derivatives, stage_cost
 from cbrrt_ompl.optimise.dynamics import add_derivatives, interval_end
 from cbrrt_ompl.optimise.inequalities import add_row_derivatives, evaluate_rows
-from cbrrt_ompl.optimise.kernels import Record, inner_kernel, kernel
+from cbrrt_ompl.optimise.kernels import inner_kernel, kernel
 from cbrrt_ompl.optimise.program import COLUMNS, CONTROLS, FIRST_COLUMNS, STATES, STEP
 from cbrrt_ompl.optimise.riccati import factorise, roll_out_step
 
@@ -75,7 +76,7 @@ LARGEST_SHIFT = 1e10
 
 @kernel
 def iterate(
-    problem: Record, distances: NDArray[np.float32], stages: NDArray[np.void], progress: Record, iterations: int
+    problem: Record, distances: NDArray[np.float32], stages: Records, progress: Record, iterations: int
 ) -> None:
     """Do some Newton steps, unless the solution converges before or no step helps any more."""
     if progress.status == SOLVE_NEW:
@@ -96,7 +97,7 @@ def iterate(
 
 
 @inner_kernel
-def enter_slacks(problem: Record, distances: NDArray[np.float32], stages: NDArray[np.void], progress: Record) -> None:
+def enter_slacks(problem: Record, distances: NDArray[np.float32], stages: Records, progress: Record) -> None:
     """Set slacks and multipliers for the states and controls in the stages."""
     last = len(stages) - 1
     for k in range(last + 1):
@@ -109,7 +110,7 @@ def enter_slacks(problem: Record, distances: NDArray[np.float32], stages: NDArra
 
 
 @inner_kernel
-def evaluate(problem: Record, distances: NDArray[np.float32], stages: NDArray[np.void], progress: Record) -> None:
+def evaluate(problem: Record, distances: NDArray[np.float32], stages: Records, progress: Record) -> None:
     """Write all derivatives at the iterate, and how far it is from a solution."""
     last = len(stages) - 1
     progress.violation = progress.infeasibility = progress.stationarity = progress.cost = progress.logarithms = 0.0
@@ -193,7 +194,7 @@ def update_barrier(progress: Record) -> None:
 
 
 @inner_kernel
-def condense(stages: NDArray[np.void], barrier: float) -> None:
+def condense(stages: Records, barrier: float) -> None:
     """Eliminate slacks and multipliers: add G' (m / s) G to the Hessians, and what belongs to it to the gradients."""
     for k in range(len(stages)):
         stage, row = stages[k], 0
@@ -214,7 +215,7 @@ def condense(stages: NDArray[np.void], barrier: float) -> None:
 
 
 @inner_kernel
-def solve_step(stages: NDArray[np.void], progress: Record) -> bool:
+def solve_step(stages: Records, progress: Record) -> bool:
     """Find the Newton step, with the smallest shift tried that makes the problem convex."""
     shift = progress.damping if progress.damping > 1e-6 else 0.0
     while not factorise(stages, shift):
@@ -231,7 +232,7 @@ def solve_step(stages: NDArray[np.void], progress: Record) -> bool:
 
 
 @inner_kernel
-def step_multipliers(stages: NDArray[np.void], barrier: float) -> tuple[float, float, float]:
+def step_multipliers(stages: Records, barrier: float) -> tuple[float, float, float]:
     """Write the steps of slacks and multipliers.
 
     Returns:
@@ -270,7 +271,7 @@ def step_multipliers(stages: NDArray[np.void], barrier: float) -> tuple[float, f
 
 @inner_kernel
 def try_step(
-    problem: Record, distances: NDArray[np.float32], stages: NDArray[np.void], progress: Record, fraction: float
+    problem: Record, distances: NDArray[np.float32], stages: Records, progress: Record, fraction: float
 ) -> None:
     """Write the trial point at a fraction of the step, with its cost, its sum of log s and its violation.
 
@@ -302,7 +303,7 @@ def try_step(
 
 
 @inner_kernel
-def move(problem: Record, distances: NDArray[np.float32], stages: NDArray[np.void], progress: Record) -> None:
+def move(problem: Record, distances: NDArray[np.float32], stages: Records, progress: Record) -> None:
     """Find how far to go along the step, and go there."""
     mu, violation = progress.barrier, progress.violation
     primal, dual, slope = step_multipliers(stages, mu)
@@ -333,7 +334,7 @@ def move(problem: Record, distances: NDArray[np.float32], stages: NDArray[np.voi
 
 
 @inner_kernel
-def accept(stages: NDArray[np.void], barrier: float, fraction: float, dual: float) -> None:
+def accept(stages: Records, barrier: float, fraction: float, dual: float) -> None:
     """Go to the trial point; multipliers move by their own fraction, costates as far as the states."""
     for k in range(len(stages)):
         stage = stages[k]

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.optimise.clearance import disc_distances, is_motion_free, least_clearance, unsafe_rows
+from cbrrt_ompl.optimise.clearance import clearances, is_motion_free, least_clearance, unsafe_rows
 from cbrrt_ompl.optimise.guess import Guess
 from cbrrt_ompl.optimise.transcription import Transcription
 from cbrrt_ompl.problem.settings import State
@@ -25,8 +25,8 @@ SOLVED_TO = 1e-3
 FIRST_BARRIER, WARM_BARRIER = 0.1, 1e-3
 """Barrier parameters to start with: from a guess, and from a solution with other margins."""
 
-TARGET = 0.002
-"""Room beyond the least clearance that the discs are to have between the nodes as well [m]."""
+TARGET = 0.001
+"""Room beyond the least clearance that the footprint is to have at all rows [m]."""
 
 SLOWER = 0.8
 """Factor of the velocity limits where the robot could not brake in time."""
@@ -96,14 +96,11 @@ def _allowed(may_iterate: Callable[[int], int], spent: int, done: int) -> int:
 def missing_margin(transcription: Transcription, trajectory: Trajectory, intervals: int) -> NDArray[np.float64]:
     """What is to be added to the margins at the nodes of a motion that is not free, shape (intervals + 1,) [m]."""
     scenario = transcription.scenario
-    nearest = -by_interval(-disc_distances(trajectory.states, scenario).min(axis=1), intervals) - least_clearance(
-        scenario
-    )
-    lack = np.maximum(0.0, TARGET - nearest)
-    add = np.where(lack > 0.0, 1.3 * lack + 0.001, 0.0)
-    if not lack.any():  # the discs are free, the footprint is not
-        add = np.where(nearest < nearest.min() + 0.01, 0.004, 0.0)
-    return at_nodes(add)
+    nearest = -by_interval(-clearances(trajectory.states, scenario), intervals)
+    lack = TARGET + least_clearance(scenario) - nearest
+    if lack.max() <= 0.0:  # the rows are far enough from everything, a point between two of them is not
+        lack = 0.002 - (nearest - nearest.min())
+    return at_nodes(np.where(lack > 0.0, 1.3 * lack + 0.001, 0.0))
 
 
 def by_interval(rows: NDArray[Any], intervals: int) -> NDArray[Any]:

@@ -18,7 +18,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.optimise.kernels import Record, inner_kernel
+from cbrrt_ompl.motion.records import Record, Records
+from cbrrt_ompl.optimise.kernels import inner_kernel
 from cbrrt_ompl.optimise.program import COLUMNS, CONTROLS, STATES, STEP
 
 LEAST_CURVATURE = 1e-12
@@ -26,7 +27,7 @@ LEAST_CURVATURE = 1e-12
 
 
 @inner_kernel
-def factorise(stages: NDArray[np.void], shift: float) -> bool:
+def factorise(stages: Records, shift: float) -> bool:
     """Run the recursion backwards.
 
     Args:
@@ -108,7 +109,7 @@ def eliminate_control(stage: Record, big_q: NDArray[np.float64], q: NDArray[np.f
 
 
 @inner_kernel
-def roll_out_step(stages: NDArray[np.void]) -> None:
+def roll_out_step(stages: Records) -> None:
     """Write the Newton steps of states and controls, forwards from the best change of h."""
     first = stages[0]
     for i in range(STATES):

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cbrrt_ompl.motion.kinematics import clamp, unicycle_step
+from cbrrt_ompl.motion.records import Record, record_array
 from cbrrt_ompl.optimise.clearance import least_clearance
 from cbrrt_ompl.optimise.cover import cover
 from cbrrt_ompl.optimise.field import field_of
 from cbrrt_ompl.optimise.guess import Guess
 from cbrrt_ompl.optimise.inequalities import lay_out_rows
 from cbrrt_ompl.optimise.interior_point import PROGRESS, SOLVE_RUNNING, iterate
-from cbrrt_ompl.optimise.kernels import Record, kernel
+from cbrrt_ompl.optimise.kernels import kernel
 from cbrrt_ompl.optimise.objective import Objective
 from cbrrt_ompl.optimise.program import PROBLEM, STAGE, STEP, THETA
 from cbrrt_ompl.problem.robot import Limits
@@ -71,7 +72,7 @@ class Transcription:
         self.scenario, self.objective, self.is_kinematic = scenario, objective, is_kinematic
         limits = scenario.robot.limits
         velocities, accelerations = velocity_rows(limits), acceleration_rows(limits)
-        problem = np.zeros(1, dtype=PROBLEM)[0]
+        problem = record_array(1, PROBLEM)[0]
         fill_rows(problem, "velocity_limit", np.empty((0, 3)) if is_kinematic else velocities)
         fill_rows(problem, "control_limit", velocities if is_kinematic else accelerations)
         fill_rows(problem, "disc", cover(scenario.robot.footprint))
@@ -101,10 +102,10 @@ class Transcription:
             last_barrier: its last value.
             may_iterate: takes the number of Newton steps so far and says how many more there may be.
         """
-        stages = np.zeros(len(guess.states), dtype=STAGE)
+        stages = record_array(len(guess.states), STAGE)
         stages["state"], stages["control"][:-1] = guess.states, guess.controls
         stages["margin"], stages["speed_cap"] = margins, speed_caps
-        progress = np.zeros(1, dtype=PROGRESS)[0]
+        progress = record_array(1, PROGRESS)[0]
         progress["barrier"], progress["last_barrier"], progress["penalty"] = barrier, last_barrier, 1.0
         turns = round((guess.states[-1, THETA] - self._goal_theta) / math.tau)
         problem, distances = self._problem.copy(), self._distances
