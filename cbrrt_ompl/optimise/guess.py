@@ -12,14 +12,17 @@ from cbrrt_ompl.optimise.program import STEP, THETA
 from cbrrt_ompl.problem.robot import Limits
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 
-INTERVAL = 0.35
+INTERVAL = 0.4
 """Duration of an interval of a guess at most, as far as the number of intervals allows [s]."""
 
-TURN = 0.5
+TURN = 0.7
 """Turn in an interval at most, for the same [rad]: the rule that integrates it is then good to 1e-5 of the path."""
 
 FEWEST, MOST = 45, 300
 """Range of the number of intervals."""
+
+EXPECTED_FRACTION = 0.6
+"""What an optimisation makes of the duration of a plan: its intervals are to have the usual duration then."""
 
 
 class Guess(NamedTuple):
@@ -46,7 +49,7 @@ def interval_count(duration: float, limits: Limits) -> int:
 
 def guess_from_trajectory(trajectory: Trajectory, limits: Limits, source: str) -> Guess:
     """The states of a trajectory, evenly in time, and the velocities' mean changes between them."""
-    n = interval_count(trajectory.duration, limits)
+    n = interval_count(EXPECTED_FRACTION * trajectory.duration, limits)
     times = np.linspace(trajectory.t[0], trajectory.t[-1], n + 1)
     states = trajectory.at(times)
     states[:, THETA] = np.unwrap(states[:, THETA])
