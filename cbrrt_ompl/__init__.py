@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from cbrrt_ompl.errors import CbrrtError, InputError
     from cbrrt_ompl.maps import OccupancyMap, load_dynobench, load_map, save_map
     from cbrrt_ompl.ompl_plugin.setup import make_setup
+    from cbrrt_ompl.optimise import Objective, improve
     from cbrrt_ompl.planning import PlanResult, plan
     from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, OrientedBox, Polygon
     from cbrrt_ompl.problem.ready_robots import ROBOTS
@@ -34,6 +35,7 @@ __all__ = [
     "Goal",
     "InputError",
     "Limits",
+    "Objective",
     "OccupancyMap",
     "OrientedBox",
     "PlanResult",
@@ -46,6 +48,7 @@ __all__ = [
     "Trajectory",
     "World",
     "__version__",
+    "improve",
     "load_dynobench",
     "load_map",
     "load_scenario",
@@ -60,6 +63,7 @@ _MODULES = {
     "collision.world": ("World",),
     "errors": ("CbrrtError", "InputError"),
     "ompl_plugin.setup": ("make_setup",),
+    "optimise": ("Objective", "improve"),
     "planning": ("PlanResult", "plan"),
     "problem.obstacles": ("Bounds", "Box", "Disc", "OrientedBox", "Polygon"),
     "problem.ready_robots": ("ROBOTS",),

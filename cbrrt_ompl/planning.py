@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from numbers import Integral
 from typing import Any
@@ -14,7 +14,11 @@ import numpy as np
 
 from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.errors import Problem, SettingsError
-from cbrrt_ompl.motion.model import check_step, make_model
+from cbrrt_ompl.motion.model import STEERING, check_step, make_model
+from cbrrt_ompl.optimise.anytime import further_guesses, robust_search
+from cbrrt_ompl.optimise.improve import Found, Improver, check_improvement, geodesic_guesses
+from cbrrt_ompl.optimise.improve import warm_up as warm_up_improvement
+from cbrrt_ompl.optimise.objective import Objective
 from cbrrt_ompl.planners.registry import PLANNERS, is_compiled, law_of, planner_named
 from cbrrt_ompl.planners.search import Search
 from cbrrt_ompl.planners.warm_up import warm_up
@@ -22,6 +26,9 @@ from cbrrt_ompl.scenario.scenario import Scenario, check_scenario
 from cbrrt_ompl.trajectory.replay import trajectory_from_controls
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.trajectory.tree import Tree
+
+ANYTIME_ITERATIONS = 3000
+"""Newton steps after which an anytime planner ends where neither they nor the time are given."""
 
 SOLVED, TIME_LIMIT, SAMPLE_LIMIT = "solved", "time limit", "sample limit"
 """How a plan ends."""
@@ -50,9 +57,11 @@ class PlanResult:
     samples: int
     """Samples drawn; for OMPL's own planners the rounds of their main loop."""
     planning_time: float
-    """Time of the search alone, without set-up and compilation [s]."""
+    """Time of the search and the improvement alone, without set-up and compilation [s]."""
     make_tree: Callable[[], Tree] = field(repr=False)
     """Makes the tree out of the planner's memory."""
+    history: tuple[Found, ...] = ()
+    """When which trajectory was found, each better than the one before: rows of (time [s], duration [s], source)."""
 
     @property
     def solved(self) -> bool:
@@ -75,8 +84,14 @@ def plan(
     seed: int | None = None,
     time_limit: float = 5.0,
     progress: Progress | None = None,
+    *,
+    improve_for: float | None = None,
+    max_iterations: int | None = None,
+    objective: Objective | None = None,
+    callback: Callable[[Found], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
 ) -> PlanResult:
-    """Plan a trajectory from the scenario's start into its goal region.
+    """Plan a trajectory from the scenario's start into its goal region, and improve it if that is asked for.
 
     Args:
         scenario: world, robot, start, goal and settings; its ``max_samples`` ends a plan whatever the time limit.
@@ -84,6 +99,13 @@ def plan(
         seed: 0 or more; the same seed gives the same result. None draws a fresh one.
         time_limit: largest planning time [s].
         progress: called about ten times a second with the samples so far and the time since the start [s].
+        improve_for: time to improve the first trajectory for, from when it is found [s]; see
+            :func:`cbrrt_ompl.improve`. None improves nothing, unless ``max_iterations`` is given.
+        max_iterations: Newton steps to improve it for: the result is then the same on every run, unless the time ends
+            it. ``cb-rrt-anytime`` ends by them where ``improve_for`` is not given.
+        objective: what to improve; the duration if not given.
+        callback: called with each trajectory's time, duration and source, as they are found.
+        should_stop: asked every few milliseconds whether to end the improvement with the best so far.
 
     Returns:
         The result; "not solved" is a status of it and no error.
@@ -95,16 +117,66 @@ def plan(
         KeyboardInterrupt: on Ctrl-C, at once.
     """
     check_scenario(scenario)
-    planner_named(planner)
+    is_anytime = planner_named(planner).is_anytime
     _check_arguments(seed, time_limit, progress)
+    check_improvement(improve_for, max_iterations, objective, callback, should_stop, name="improve_for")
     check_step(scenario.robot, scenario.planning)
     warm_up_planner(planner)
+    improves = is_anytime or improve_for is not None or max_iterations is not None
+    if improves:
+        warm_up_improvement()
     watch = _Watch(time_limit, progress)
     if not scenario.goal.violations(scenario.start):
         return _already_there(scenario, planner, seed)
+    seed_of_plans = seed
+    if is_anytime and seed is None:
+        seed_of_plans = int(np.random.default_rng().integers(2**31))
+    result = _first_plan(scenario, planner, seed_of_plans, watch)
+    if improves and (result.solved or is_anytime):
+        if improve_for is None and max_iterations is None:
+            max_iterations = ANYTIME_ITERATIONS
+        improver = Improver(
+            scenario,
+            Objective() if objective is None else objective,
+            math.inf if improve_for is None else improve_for,
+            max_iterations,
+            callback,
+            should_stop,
+            is_kinematic=law_of(planner, scenario.planning) == STEERING,
+            began=watch.began,
+        )
+        result = _improved(result, scenario, seed_of_plans, improver)
+    return replace(result, seed=seed)
+
+
+def _first_plan(scenario: Scenario, planner: str, seed: int | None, watch: _Watch) -> PlanResult:
+    """What a planner finds first."""
+    if PLANNERS[planner].is_anytime:
+        assert seed is not None
+        return _run(robust_search(scenario, seed), scenario, planner, seed, watch)
     if is_compiled(planner):
         return _plan_compiled(scenario, planner, seed, watch)
     return _plan_in_ompl(scenario, planner, seed, watch)
+
+
+def _improved(result: PlanResult, scenario: Scenario, seed: int | None, improver: Improver) -> PlanResult:
+    """The best of a plan and what an improver makes of it; the anytime planner goes on with guesses of its own."""
+    if result.trajectory is not None:
+        improver.improve(result.trajectory, result.planner)
+    else:
+        improver.run(geodesic_guesses(scenario))
+    if PLANNERS[result.planner].is_anytime and improver.best is not None:
+        assert seed is not None
+        improver.explore(further_guesses(scenario, seed, improver.has_ended))
+    if improver.best is None:
+        return result
+    return replace(
+        result,
+        status=SOLVED,
+        trajectory=improver.best,
+        planning_time=improver.elapsed(),
+        history=tuple(improver.history),
+    )
 
 
 def warm_up_planner(planner: str) -> None:
@@ -143,8 +215,13 @@ def _plan_compiled(scenario: Scenario, planner: str, seed: int | None, watch: _W
         neighbours=planning.nearest_neighbour,
         robust=PLANNERS[planner].is_robust,
     )
+    return _run(search, scenario, planner, seed, watch)
+
+
+def _run(search: Search, scenario: Scenario, planner: str, seed: int | None, watch: _Watch) -> PlanResult:
+    """Run a search of the compiled loop."""
     watch.start()
-    search.run(watch.should_stop, planning.max_samples)
+    search.run(watch.should_stop, scenario.planning.max_samples)
     planning_time = watch.elapsed()
     return PlanResult(
         planner=planner,
@@ -195,24 +272,24 @@ class _Watch:
         self.ended_by = SAMPLE_LIMIT
         self._time_limit = time_limit
         self._progress = progress
-        self._began = self._next_report = 0.0
+        self.began = self._next_report = 0.0
 
     def start(self) -> None:
         """Begin to count the time."""
-        self._began = time.perf_counter()
-        self._next_report = self._began + PROGRESS_PERIOD
+        self.began = time.perf_counter()
+        self._next_report = self.began + PROGRESS_PERIOD
 
     def elapsed(self) -> float:
         """Time since the start [s]."""
-        return time.perf_counter() - self._began
+        return time.perf_counter() - self.began
 
     def should_stop(self, samples: int) -> bool:
         """Whether the time is up; being Python code, this also lets a Ctrl-C through to the planner."""
         now = time.perf_counter()
-        if now - self._began >= self._time_limit:
+        if now - self.began >= self._time_limit:
             self.ended_by = TIME_LIMIT
             return True
         if self._progress is not None and now >= self._next_report:
             self._next_report = now + PROGRESS_PERIOD
-            self._progress(samples, now - self._began)
+            self._progress(samples, now - self.began)
         return False

@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from cbrrt_ompl.collision.motion_check import ASK
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.motion.kinematics import unicycle_step

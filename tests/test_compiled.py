@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from numpy.typing import NDArray
 
 from cbrrt_ompl import load_scenario, make_setup, plan, verify
-from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.motion.model import law_of, pack_model
 from cbrrt_ompl.ompl_plugin.binding import ob, oc, ot, ou

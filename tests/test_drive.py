@@ -9,10 +9,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from cbrrt_ompl.collision.clearance_map import ClearanceMap, clearance_map_for, extend_map
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cbrrt_ompl.collision.clearance_map import ClearanceMap, clearance_map_for, extend_map
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.drive import Drive, DriveResult, DriveSettings, drive
 from cbrrt_ompl.drive.knowledge import Knowledge

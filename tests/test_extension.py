@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from kernels import (
@@ -25,7 +26,6 @@ from kernels import (
     states_of,
 )
 
-from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from cbrrt_ompl.collision.motion_check import BLOCKED
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.motion.control_laws import reference_pose, tracking_command

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from cbrrt_ompl.collision.clearance_map import ROOM, ClearanceMap
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from kernels import (
@@ -27,7 +28,6 @@ from kernels import (
 )
 
 from cbrrt_ompl.collision import clearance_map as clearance_map_module
-from cbrrt_ompl.collision.clearance_map import ROOM, ClearanceMap
 from cbrrt_ompl.collision.motion_check import BLOCKED, is_free
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.motion.model import OPEN_LOOP, STEERING

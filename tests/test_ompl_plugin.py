@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from cbrrt_ompl import load_scenario, make_setup, plan
-from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import UnknownPlannerError
 from cbrrt_ompl.motion.model import GoalRegion, in_goal

@@ -204,12 +204,16 @@ def test_discs_polygons_and_odd_footprints_are_handled() -> None:
     assert verify(better, scenario).ok
 
 
-def test_a_kinematic_trajectory_is_refused_with_the_reason() -> None:
+@pytest.mark.parametrize("planner", ["s-rrt-compiled", "s-rrt"])
+def test_a_kinematic_trajectory_is_improved_as_one(planner: str) -> None:
+    """Its velocities go on to jump: without limits of acceleration it takes no longer than the shortest path does."""
     scenario = scenario_of(goal=Goal(5.0, 3.0, tolerance=0.5))
-    given = plan(scenario, "s-rrt-compiled", seed=0).trajectory
+    given = plan(scenario, planner, seed=1, time_limit=20.0).trajectory
     assert given is not None
-    with pytest.raises(TrajectoryError, match="velocities ramp"):
-        improve(given, scenario)
+    better = improve(given, scenario, max_iterations=400)
+    assert better.kinematic
+    assert better.duration < given.duration
+    assert verify(better, scenario).violations == ()
 
 
 def test_a_trajectory_of_another_scenario_is_refused() -> None:

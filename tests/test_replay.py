@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.motion.control_laws import tracking_command
 from cbrrt_ompl.motion.kinematics import dynamic_step, kinematic_step

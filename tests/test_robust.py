@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cbrrt_ompl.collision.clearance_map import ClearanceMap
 
 from cbrrt_ompl import (
     Bounds,
@@ -23,7 +24,6 @@ from cbrrt_ompl import (
     plan,
     verify,
 )
-from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from cbrrt_ompl.motion.model import law_of, pack_model
 from cbrrt_ompl.ompl_plugin.compiled_planner import CompiledPlanner
 from cbrrt_ompl.planners.growth import bearable_failures

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
+from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from kernels import LAWS, roll_out_answered
 
-from cbrrt_ompl.collision.clearance_map import ClearanceMap
 from cbrrt_ompl.collision.motion_check import BLOCKED, FREE
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.motion.model import CLOSED_LOOP, pack_model

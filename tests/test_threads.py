@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cbrrt_ompl.collision.clearance_map import clearance_map_for
 
 from cbrrt_ompl import PlanResult, Scenario, load_scenario, plan, verify
-from cbrrt_ompl.collision.clearance_map import clearance_map_for
 from cbrrt_ompl.problem.robot import Footprint
 from cbrrt_ompl.scenario.scenario import scenario_from_dict
 

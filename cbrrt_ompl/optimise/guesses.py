@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,22 +27,29 @@ SPACING = 0.1
 SMOOTHINGS = 10
 """Times that each point is replaced by a mean with its neighbours."""
 
+AVOIDANCE = 3.0
+"""How much more a metre costs near a path that is to be avoided."""
+
 AHEAD, BACKWARDS = 1, -1
 """Gears."""
 
 
-def geodesic(scenario: Scenario) -> NDArray[np.float64] | None:
+def geodesic(scenario: Scenario, avoid: Sequence[NDArray[np.float64]] = ()) -> NDArray[np.float64] | None:
     """A short path from the start to the goal for the robot's origin.
 
     Cells nearer to anything than the robot is wide to either side are avoided, and where that leaves no path, those
     nearer than its inscribed radius.
+
+    Args:
+        scenario: world, robot, start and goal.
+        avoid: paths of former calls: near them, but for their ends, a metre costs `AVOIDANCE` times as much for each.
 
     Returns:
         Points of the path, shape (n, 2) [m]; None where the grid has none.
     """
     footprint, margin = scenario.robot.footprint, least_clearance(scenario)
     for inner in dict.fromkeys((lateral_extent(footprint), footprint.inscribed_radius)):
-        path = _shortest_path(scenario, inner + margin, footprint.circumscribed_radius + margin + 0.02)
+        path = _shortest_path(scenario, inner + margin, footprint.circumscribed_radius + margin + 0.02, avoid)
         if path is not None:
             return path
     return None
@@ -52,20 +60,29 @@ def lateral_extent(footprint: Footprint) -> float:
     return footprint.radius if footprint.vertices is None else float(np.abs(footprint.vertices[:, 1]).max())
 
 
-def _shortest_path(scenario: Scenario, inner: float, outer: float) -> NDArray[np.float64] | None:
+def _shortest_path(
+    scenario: Scenario, inner: float, outer: float, avoid: Sequence[NDArray[np.float64]]
+) -> NDArray[np.float64] | None:
     bounds = scenario.world.bounds
     width, height = bounds.size
     cell = max(math.sqrt(width * height / MOST_CELLS), min(LARGEST_CELL, max(0.7 * inner, SMALLEST_CELL)))
     columns, rows = math.ceil(width / cell), math.ceil(height / cell)
     (x_min, y_min), start, goal = bounds.min, scenario.start, scenario.goal
     costs = cell_costs(*field_of(scenario.world), bounds.min, cell, (rows, columns), inner, outer)
-    ends = []
+    ends, reach = [], math.ceil(outer / cell)
     for x, y in ((start.x, start.y), (goal.x, goal.y)):
         i, j = min(int((x - x_min) / cell), columns - 1), min(int((y - y_min) / cell), rows - 1)
-        reach = math.ceil(outer / cell)
         around = costs.reshape(rows, columns)[max(j - reach, 0) : j + reach + 1, max(i - reach, 0) : i + reach + 1]
         around[np.isinf(around)] = 10.0  # the ends are free, however the grid sees them
         ends.append(j * columns + i)
+    for path in avoid:
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+        inside = path[(along > 0.2 * along[-1]) & (along < 0.8 * along[-1])]
+        marked = np.zeros(rows * columns, dtype=np.bool_)
+        for i, j in np.floor((inside - bounds.min) / cell).astype(int).tolist():
+            around = marked.reshape(rows, columns)[max(j - reach, 0) : j + reach + 1, max(i - reach, 0) : i + reach + 1]
+            around[:] = True
+        costs[marked] *= AVOIDANCE
     cells = shortest_path(costs, columns, *ends)
     if not len(cells):
         return None

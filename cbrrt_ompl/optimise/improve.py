@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from numbers import Integral
 from typing import NamedTuple
@@ -66,7 +66,8 @@ def improve(
     returned, or what was given where nothing is better: it keeps all limits, the clearance and the goal region.
 
     Args:
-        trajectory: from the scenario's start into its goal region, of any planner whose velocities ramp.
+        trajectory: from the scenario's start into its goal region, of any planner. A kinematic one, whose velocities
+            jump (S-RRT), is improved as such: accelerations have no limit, and the velocities keep theirs.
         scenario: world, robot, start, goal and settings.
         time_limit: time to stop after, without that of compilation [s]; 1 s where nothing else is asked for.
         max_iterations: Newton steps to stop after: the result is then the same on every run, unless the time ends it.
@@ -79,23 +80,22 @@ def improve(
 
     Raises:
         ScenarioError: if this is no scenario.
-        TrajectoryError: if this is no trajectory, one that does not lead from the start to the goal, or a kinematic
-            one: its velocities jump, which no robot with limits of acceleration can follow.
+        TrajectoryError: if this is no trajectory, or one that does not lead from the start to the goal.
         SettingsError: if a limit or the objective make no sense.
     """
     check_scenario(scenario)
+    check_improvement(time_limit, max_iterations, objective, callback, should_stop)
     objective = Objective() if objective is None else objective
-    _check_arguments(time_limit, max_iterations, objective, callback, should_stop)
     _check_trajectory(trajectory, scenario)
     if time_limit is None:
         time_limit = TIME_LIMIT if max_iterations is None else math.inf
     warm_up()
-    search = Improver(scenario, objective, time_limit, max_iterations, callback, should_stop)
-    search.adopt(trajectory, "given")
-    if trajectory.duration > 0.0:
-        search.run([guess_from_trajectory(trajectory, scenario.robot.limits, "given"), *geodesic_guesses(scenario)])
-    assert search.best is not None
-    return search.best
+    improver = Improver(
+        scenario, objective, time_limit, max_iterations, callback, should_stop, is_kinematic=trajectory.kinematic
+    )
+    improver.improve(trajectory, "given")
+    assert improver.best is not None
+    return improver.best
 
 
 class Improver:
@@ -115,12 +115,27 @@ class Improver:
         max_iterations: int | None = None,
         callback: Callable[[Found], None] | None = None,
         should_stop: Callable[[], bool] | None = None,
+        *,
+        is_kinematic: bool = False,
+        began: float | None = None,
     ) -> None:
-        """Begin to count the time."""
-        self._began = time.perf_counter()
+        """Begin to count the time.
+
+        Args:
+            scenario: world, robot, start and goal.
+            objective: what to optimise.
+            time_limit: time to stop after [s].
+            max_iterations: Newton steps to stop after.
+            callback: called with each row of the history.
+            should_stop: asked every few milliseconds whether to stop.
+            is_kinematic: whether the velocities jump.
+            began: when the history's time is 0, by `time.perf_counter` [s]; now if not given.
+        """
+        now = time.perf_counter()
+        self._began, self._deadline = now if began is None else began, now + time_limit
         self._scenario, self._objective = scenario, objective
-        self._transcription = Transcription(scenario, objective)
-        self._time_limit, self._max_iterations = time_limit, max_iterations
+        self._transcription = Transcription(scenario, objective, is_kinematic=is_kinematic)
+        self._max_iterations = max_iterations
         self._callback, self._should_stop = callback, should_stop
         self._best_guess: Guess | None = None
         self._best_cost = math.inf
@@ -128,11 +143,26 @@ class Improver:
         self.history: list[Found] = []
         self.iterations = 0
 
+    def improve(self, trajectory: Trajectory, source: str) -> None:
+        """Adopt a trajectory that passed all checks, and try it and the geodesics as guesses."""
+        self.adopt(trajectory, source)
+        if trajectory.duration > 0.0 and not self.has_ended():
+            guess = guess_from_trajectory(trajectory, self._scenario.robot.limits, f"{source}, optimised")
+            self.run([guess, *geodesic_guesses(self._scenario)])
+
     def run(self, guesses: list[Guess]) -> None:
         """Try guesses, the shortest first, and then refine the best of what came of them."""
         for guess in sorted(guesses, key=lambda guess: guess.duration):
             self.try_guess(guess)
         self.refine()
+
+    def explore(self, guesses: Iterator[Guess]) -> None:
+        """Try one guess after the other, and refine at once what is better than the best."""
+        for guess in guesses:
+            if self.try_guess(guess):
+                self.refine()
+            if self.has_ended():
+                return
 
     def adopt(self, trajectory: Trajectory, source: str, guess: Guess | None = None) -> bool:
         """Keep a trajectory that passed all checks, where it is better than the best; says whether it is."""
@@ -173,7 +203,7 @@ class Improver:
 
     def has_ended(self) -> bool:
         """Whether time or Newton steps are used up, or the caller wants to stop."""
-        if self._left() <= 0 or self.elapsed() >= self._time_limit:
+        if self._left() <= 0 or time.perf_counter() >= self._deadline:
             return True
         return self._should_stop is not None and bool(self._should_stop())
 
@@ -205,11 +235,6 @@ def _check_trajectory(trajectory: object, scenario: Scenario) -> None:
     """Refuse what cannot be improved."""
     if not isinstance(trajectory, Trajectory):
         raise TrajectoryError(Problem("trajectory", trajectory, "a value of type Trajectory"))
-    if trajectory.kinematic:
-        expected = (
-            "a trajectory whose velocities ramp: where they jump, as those of s-rrt do, accelerations have no limit"
-        )
-        raise TrajectoryError(Problem("trajectory.kinematic", True, expected))
     problems = []
     error = trajectory.states[0] - scenario.start
     error[2] = wrapped(error[2])
@@ -221,22 +246,27 @@ def _check_trajectory(trajectory: object, scenario: Scenario) -> None:
         raise TrajectoryError(problems)
 
 
-def _check_arguments(
-    time_limit: object, max_iterations: object, objective: object, callback: object, should_stop: object
+def check_improvement(
+    time_limit: object,
+    max_iterations: object,
+    objective: object,
+    callback: object,
+    should_stop: object,
+    name: str = "time_limit",
 ) -> None:
-    """Refuse what no improvement can start with."""
+    """Refuse what no improvement can start with; the time limit goes by some name."""
     problems = []
     is_infinite = isinstance(time_limit, float) and time_limit == math.inf
     if time_limit is not None and not (is_infinite or (is_number(time_limit) and time_limit > 0.0)):
-        problems.append(Problem("time_limit", time_limit, "a number above 0 [s], or None"))
+        problems.append(Problem(name, time_limit, "a number above 0 [s], or None"))
     if max_iterations is not None and not (
         is_number(max_iterations) and isinstance(max_iterations, Integral) and max_iterations >= 0
     ):
         problems.append(Problem("max_iterations", max_iterations, "a whole number of 0 or more, or None"))
-    if not isinstance(objective, Objective):
+    if not isinstance(objective, Objective | None):
         problems.append(Problem("objective", objective, "a value of type Objective, or None"))
-    for name, value in (("callback", callback), ("should_stop", should_stop)):
+    for argument, value in (("callback", callback), ("should_stop", should_stop)):
         if value is not None and not callable(value):
-            problems.append(Problem(name, value, "something to call, or None"))
+            problems.append(Problem(argument, value, "something to call, or None"))
     if problems:
         raise SettingsError(problems)

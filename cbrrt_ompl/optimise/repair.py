@@ -75,8 +75,9 @@ def solve_and_repair(
         trajectory = transcription.trajectory(guess)
         if scenario.goal.violations(State(*trajectory.states[-1].tolist())):
             return None
-        free = is_motion_free(trajectory.states, float(trajectory.t[1] - trajectory.t[0]), scenario)
-        if free and not scenario.planning.brake_safe:
+        dt = float(trajectory.t[1] - trajectory.t[0])
+        free = is_motion_free(trajectory.states, dt, scenario, is_kinematic=trajectory.kinematic)
+        if free and (trajectory.kinematic or not scenario.planning.brake_safe):
             return Improvement(trajectory, guess)
         if free:
             unsafe = by_interval(unsafe_rows(trajectory.states, scenario), n)

@@ -19,7 +19,7 @@ from cbrrt_ompl.optimise.inequalities import lay_out_rows
 from cbrrt_ompl.optimise.interior_point import PROGRESS, SOLVE_RUNNING, iterate
 from cbrrt_ompl.optimise.kernels import kernel
 from cbrrt_ompl.optimise.objective import Objective
-from cbrrt_ompl.optimise.program import PROBLEM, STAGE, STEP, THETA
+from cbrrt_ompl.optimise.program import OMEGA, PROBLEM, STAGE, STEP, THETA, V
 from cbrrt_ompl.problem.robot import Limits
 from cbrrt_ompl.problem.settings import Goal
 from cbrrt_ompl.scenario.scenario import Scenario
@@ -103,7 +103,8 @@ class Transcription:
             may_iterate: takes the number of Newton steps so far and says how many more there may be.
         """
         stages = record_array(len(guess.states), STAGE)
-        stages["state"], stages["control"][:-1] = guess.states, guess.controls
+        stages["state"] = guess.states
+        stages["control"][:-1] = guess.states[1:, V : OMEGA + 1] if self.is_kinematic else guess.controls
         stages["margin"], stages["speed_cap"] = margins, speed_caps
         progress = record_array(1, PROGRESS)[0]
         progress["barrier"], progress["last_barrier"], progress["penalty"] = barrier, last_barrier, 1.0
