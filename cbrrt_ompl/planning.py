@@ -27,6 +27,9 @@ from cbrrt_ompl.trajectory.replay import trajectory_from_controls
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.trajectory.tree import Tree
 
+FIRST_SAMPLES = 5_000
+"""Samples after which an anytime planner looks for another first plan than that of CB-RRT."""
+
 ANYTIME_ITERATIONS = 3000
 """Newton steps after which an anytime planner ends where neither they nor the time are given."""
 
@@ -128,46 +131,60 @@ def plan(
     watch = _Watch(time_limit, progress)
     if not scenario.goal.violations(scenario.start):
         return _already_there(scenario, planner, seed)
-    seed_of_plans = seed
-    if is_anytime and seed is None:
-        seed_of_plans = int(np.random.default_rng().integers(2**31))
-    result = _first_plan(scenario, planner, seed_of_plans, watch)
-    if improves and (result.solved or is_anytime):
-        if improve_for is None and max_iterations is None:
-            max_iterations = ANYTIME_ITERATIONS
-        improver = Improver(
-            scenario,
-            Objective() if objective is None else objective,
-            math.inf if improve_for is None else improve_for,
-            max_iterations,
-            callback,
-            should_stop,
-            is_kinematic=law_of(planner, scenario.planning) == STEERING,
-            began=watch.began,
-        )
-        result = _improved(result, scenario, seed_of_plans, improver)
-    return replace(result, seed=seed)
+    if not improves:
+        return _first_plan(scenario, planner, seed, watch)
+    if is_anytime and improve_for is None and max_iterations is None:
+        max_iterations = ANYTIME_ITERATIONS
+    improver = Improver(
+        scenario,
+        Objective() if objective is None else objective,
+        math.inf,
+        max_iterations,
+        callback,
+        should_stop,
+        is_kinematic=law_of(planner, scenario.planning) == STEERING,
+    )
+    budget = math.inf if improve_for is None else improve_for
+    if is_anytime:
+        return _plan_anytime(scenario, planner, seed, watch, improver, budget)
+    result = _first_plan(scenario, planner, seed, watch)
+    if result.trajectory is not None:
+        improver.begin(budget, watch.began)
+        improver.improve(result.trajectory, planner)
+    return _with_best(result, improver)
 
 
 def _first_plan(scenario: Scenario, planner: str, seed: int | None, watch: _Watch) -> PlanResult:
     """What a planner finds first."""
-    if PLANNERS[planner].is_anytime:
-        assert seed is not None
-        return _run(robust_search(scenario, seed), scenario, planner, seed, watch)
     if is_compiled(planner):
         return _plan_compiled(scenario, planner, seed, watch)
     return _plan_in_ompl(scenario, planner, seed, watch)
 
 
-def _improved(result: PlanResult, scenario: Scenario, seed: int | None, improver: Improver) -> PlanResult:
-    """The best of a plan and what an improver makes of it; the anytime planner goes on with guesses of its own."""
-    if result.trajectory is not None:
-        improver.improve(result.trajectory, result.planner)
-    else:
+def _plan_anytime(
+    scenario: Scenario, planner: str, seed: int | None, watch: _Watch, improver: Improver, budget: float
+) -> PlanResult:
+    """The first plan of CB-RRT, or of the geodesic where that takes long; then guess after guess."""
+    first_seed = int(np.random.default_rng().integers(2**31)) if seed is None else seed
+    search, most = robust_search(scenario, first_seed), scenario.planning.max_samples
+    watch.start()
+    improver.begin(watch.left(), watch.began)
+    search.run(watch.should_stop, min(FIRST_SAMPLES, most))
+    if not search.has_reached_goal:
         improver.run(geodesic_guesses(scenario))
-    if PLANNERS[result.planner].is_anytime and improver.best is not None:
-        assert seed is not None
-        improver.explore(further_guesses(scenario, seed, improver.has_ended))
+        if improver.best is None:
+            search.run(watch.should_stop, most)
+    result = _result_of(search, planner, seed, watch)
+    improver.begin(budget, watch.began)
+    if search.has_reached_goal:
+        improver.improve(search.trajectory(), planner)
+    if improver.best is not None:
+        improver.explore(further_guesses(scenario, first_seed, improver.has_ended))
+    return _with_best(result, improver)
+
+
+def _with_best(result: PlanResult, improver: Improver) -> PlanResult:
+    """A result with the best trajectory of an improver, if it has one."""
     if improver.best is None:
         return result
     return replace(
@@ -186,6 +203,8 @@ def warm_up_planner(planner: str) -> None:
         from cbrrt_ompl.ompl_plugin import warm_up as plugin  # here, so that the compiled planners need no OMPL
 
         plugin.warm_up()
+    if planner_named(planner).is_anytime:
+        warm_up_improvement()
 
 
 def _check_arguments(seed: object, time_limit: object, progress: object) -> None:
@@ -215,13 +234,13 @@ def _plan_compiled(scenario: Scenario, planner: str, seed: int | None, watch: _W
         neighbours=planning.nearest_neighbour,
         robust=PLANNERS[planner].is_robust,
     )
-    return _run(search, scenario, planner, seed, watch)
-
-
-def _run(search: Search, scenario: Scenario, planner: str, seed: int | None, watch: _Watch) -> PlanResult:
-    """Run a search of the compiled loop."""
     watch.start()
-    search.run(watch.should_stop, scenario.planning.max_samples)
+    search.run(watch.should_stop, planning.max_samples)
+    return _result_of(search, planner, seed, watch)
+
+
+def _result_of(search: Search, planner: str, seed: int | None, watch: _Watch) -> PlanResult:
+    """What came of a search by the compiled loop."""
     planning_time = watch.elapsed()
     return PlanResult(
         planner=planner,
@@ -278,6 +297,10 @@ class _Watch:
         """Begin to count the time."""
         self.began = time.perf_counter()
         self._next_report = self.began + PROGRESS_PERIOD
+
+    def left(self) -> float:
+        """Time that is left [s]."""
+        return self._time_limit - self.elapsed()
 
     def elapsed(self) -> float:
         """Time since the start [s]."""

@@ -12,12 +12,12 @@ import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from cbrrt_ompl.cli import bench, completion, demo, drive, plan, planners, report, reproduce, show, verify
+from cbrrt_ompl.cli import bench, completion, demo, drive, improve, plan, planners, report, reproduce, show, verify
 from cbrrt_ompl.cli.exit_codes import BAD_INPUT, BROKEN_PIPE, INTERRUPTED
 from cbrrt_ompl.cli.output import print_error
 from cbrrt_ompl.errors import CbrrtError, Problem
 
-COMMANDS = (plan, drive, verify, show, planners, bench, report, reproduce, demo, completion)
+COMMANDS = (plan, improve, drive, verify, show, planners, bench, report, reproduce, demo, completion)
 """The modules of the commands, in the order of the help."""
 
 EXAMPLES = """\

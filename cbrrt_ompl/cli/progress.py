@@ -9,8 +9,13 @@ from contextlib import ExitStack, contextmanager
 from typing import Any
 
 
-def warm_up(planner: str) -> None:
-    """Load the kernels of a planner, and say so on a terminal where they must be compiled first."""
+def warm_up(planner: str | None, improves: bool = False) -> None:
+    """Load the kernels of a planner, and say so on a terminal where they must be compiled first.
+
+    Args:
+        planner: its name; None for none.
+        improves: whether trajectories are to be improved.
+    """
     from cbrrt_ompl import planning
 
     message = "cbrrt: compiling the planners, once after installation ..."
@@ -19,7 +24,10 @@ def warm_up(planner: str) -> None:
     if sys.stderr.isatty():
         timer.start()
     try:
-        planning.warm_up_planner(planner)
+        if planner is not None:
+            planning.warm_up_planner(planner)
+        if improves:
+            planning.warm_up_improvement()
     finally:
         timer.cancel()
 

@@ -14,11 +14,14 @@ from cbrrt_ompl.figures.figures import (
     draw_velocities,
     draw_world,
 )
+from cbrrt_ompl.figures.improvement import draw_history, draw_improvement
 
 __all__ = [
     "draw_computing_times",
     "draw_drive",
     "draw_extension",
+    "draw_history",
+    "draw_improvement",
     "draw_plan",
     "draw_scene",
     "draw_trajectory",

@@ -18,8 +18,11 @@ from cbrrt_ompl.scenario.scenario import Scenario
 MOST_CELLS = 400_000
 """Cells of the grid for the geodesic, at most."""
 
-LARGEST_CELL, SMALLEST_CELL = 0.1, 0.02
+LARGEST_CELL, SMALLEST_CELL = 0.1, 0.05
 """Range of the side of a cell [m], as far as `MOST_CELLS` allows."""
+
+LEAST_ROOM = 1.15
+"""Room beside a path in cells, at least: the longest step, sqrt(5) cells, does not lead through a thin wall then."""
 
 SPACING = 0.1
 """Distance of the points of a path before it is smoothed [m]."""
@@ -65,7 +68,8 @@ def _shortest_path(
 ) -> NDArray[np.float64] | None:
     bounds = scenario.world.bounds
     width, height = bounds.size
-    cell = max(math.sqrt(width * height / MOST_CELLS), min(LARGEST_CELL, max(0.7 * inner, SMALLEST_CELL)))
+    cell = max(math.sqrt(width * height / MOST_CELLS), min(LARGEST_CELL, max(inner / LEAST_ROOM, SMALLEST_CELL)))
+    inner, outer = max(inner, LEAST_ROOM * cell), max(outer, LEAST_ROOM * cell)
     columns, rows = math.ceil(width / cell), math.ceil(height / cell)
     (x_min, y_min), start, goal = bounds.min, scenario.start, scenario.goal
     costs = cell_costs(*field_of(scenario.world), bounds.min, cell, (rows, columns), inner, outer)

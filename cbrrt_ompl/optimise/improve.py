@@ -117,7 +117,6 @@ class Improver:
         should_stop: Callable[[], bool] | None = None,
         *,
         is_kinematic: bool = False,
-        began: float | None = None,
     ) -> None:
         """Begin to count the time.
 
@@ -129,10 +128,8 @@ class Improver:
             callback: called with each row of the history.
             should_stop: asked every few milliseconds whether to stop.
             is_kinematic: whether the velocities jump.
-            began: when the history's time is 0, by `time.perf_counter` [s]; now if not given.
         """
-        now = time.perf_counter()
-        self._began, self._deadline = now if began is None else began, now + time_limit
+        self.begin(time_limit, time.perf_counter())
         self._scenario, self._objective = scenario, objective
         self._transcription = Transcription(scenario, objective, is_kinematic=is_kinematic)
         self._max_iterations = max_iterations
@@ -142,6 +139,10 @@ class Improver:
         self.best: Trajectory | None = None
         self.history: list[Found] = []
         self.iterations = 0
+
+    def begin(self, time_limit: float, began: float) -> None:
+        """Stop after a time from now on [s]; the history counts from another one, by `time.perf_counter` [s]."""
+        self._began, self._deadline = began, time.perf_counter() + time_limit
 
     def improve(self, trajectory: Trajectory, source: str) -> None:
         """Adopt a trajectory that passed all checks, and try it and the geodesics as guesses."""
