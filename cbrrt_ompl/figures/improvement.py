@@ -57,6 +57,6 @@ def draw_history(ax: Axes, history: Sequence[Found]) -> Axes:
     ax.set_xlabel("time [ms]")
     ax.set_ylabel("duration of the trajectory [s]")
     ax.set_ylim(bottom=0.0)
-    ax.margins(x=0.25)
+    ax.margins(x=0.45)
     ax.grid(alpha=0.3)
     return ax
