@@ -29,7 +29,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from cbrrt_ompl import Goal, Scenario, State, load_dynobench, load_map, plan, verify
-from cbrrt_ompl.optimise.improve import Found
+from cbrrt_ompl.optimise.improving import Found
 from cbrrt_ompl.planners.registry import PLANNERS
 
 PLANNER = next(name for name, row in PLANNERS.items() if row.is_anytime)

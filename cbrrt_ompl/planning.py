@@ -16,8 +16,8 @@ from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.errors import Problem, SettingsError
 from cbrrt_ompl.motion.model import STEERING, check_step, make_model
 from cbrrt_ompl.optimise.anytime import further_guesses, robust_search
-from cbrrt_ompl.optimise.improve import Found, Improver, check_improvement, geodesic_guesses
-from cbrrt_ompl.optimise.improve import warm_up as warm_up_improvement
+from cbrrt_ompl.optimise.improving import Found, Improver, check_improvement, geodesic_guesses
+from cbrrt_ompl.optimise.improving import warm_up as warm_up_improvement
 from cbrrt_ompl.optimise.objective import Objective
 from cbrrt_ompl.planners.registry import PLANNERS, is_compiled, law_of, planner_named
 from cbrrt_ompl.planners.search import Search

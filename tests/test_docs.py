@@ -141,7 +141,7 @@ def test_the_scenario_on_the_scenario_page_can_be_loaded(docs: Path, tmp_path: P
     assert len(load_scenario(path).world.obstacles) == 4
 
 
-@pytest.mark.parametrize("page", ["getting-started.md", "own-map.md", "faq.md"])
+@pytest.mark.parametrize("page", ["getting-started.md", "own-map.md", "improve.md", "faq.md"])
 def test_the_python_on_the_pages_runs(repository: Path, docs: Path, tmp_path: Path, page: str) -> None:
     code = "\n".join(blocks((docs / page).read_text(encoding="utf-8"), "python"))
     environment = {**os.environ, "PYTHONPATH": str(repository)}

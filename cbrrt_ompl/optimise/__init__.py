@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cbrrt_ompl.optimise.improve import Found, improve
+from cbrrt_ompl.optimise.improving import Found, improve
 from cbrrt_ompl.optimise.objective import Objective
 
 __all__ = ["Found", "Objective", "improve"]
