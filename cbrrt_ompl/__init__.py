@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from cbrrt_ompl.ompl_plugin.setup import make_setup
     from cbrrt_ompl.ompl_plugin.space import make_control_space, make_state_space, read_state, write_state
     from cbrrt_ompl.ompl_plugin.validity import FclStateValidityChecker
+    from cbrrt_ompl.optimise import Objective, improve
     from cbrrt_ompl.planning import PlanResult, plan
     from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, OrientedBox, Polygon
     from cbrrt_ompl.problem.ready_robots import ROBOTS
@@ -48,6 +49,7 @@ __all__ = [
     "InputError",
     "KanayamaDirectedControlSampler",
     "Limits",
+    "Objective",
     "OccupancyMap",
     "OmplMissingError",
     "OrientedBox",
@@ -65,6 +67,7 @@ __all__ = [
     "World",
     "__version__",
     "follow",
+    "improve",
     "load_dynobench",
     "load_map",
     "load_scenario",
@@ -95,6 +98,7 @@ _MODULES = {
     "ompl_plugin.setup": ("make_setup",),
     "ompl_plugin.space": ("make_control_space", "make_state_space", "read_state", "write_state"),
     "ompl_plugin.validity": ("FclStateValidityChecker",),
+    "optimise": ("Objective", "improve"),
     "planning": ("PlanResult", "plan"),
     "problem.obstacles": ("Bounds", "Box", "Disc", "OrientedBox", "Polygon"),
     "problem.ready_robots": ("ROBOTS",),

@@ -15,8 +15,12 @@ import numpy as np
 from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.collision.free_poses import nearest_free_pose
 from cbrrt_ompl.errors import Problem, SettingsError
-from cbrrt_ompl.motion.model import check_step, make_model
+from cbrrt_ompl.motion.model import STEERING, check_step, make_model
 from cbrrt_ompl.ompl_plugin.availability import check_ompl, has_ompl
+from cbrrt_ompl.optimise.anytime import further_guesses, robust_search
+from cbrrt_ompl.optimise.improving import Found, Improver, check_improvement, geodesic_guesses
+from cbrrt_ompl.optimise.improving import warm_up as warm_up_improvement
+from cbrrt_ompl.optimise.objective import Objective
 from cbrrt_ompl.planners.registry import PLANNERS, is_compiled, law_of, planner_named
 from cbrrt_ompl.planners.search import Search
 from cbrrt_ompl.planners.warm_up import warm_up
@@ -27,6 +31,12 @@ from cbrrt_ompl.scenario.scenario import Scenario, check_scenario
 from cbrrt_ompl.trajectory.replay import trajectory_from_controls
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.trajectory.tree import Tree
+
+FIRST_SAMPLES = 5_000
+"""Samples after which an anytime planner looks for another first plan than that of CB-RRT."""
+
+ANYTIME_ITERATIONS = 3000
+"""Newton steps after which an anytime planner ends where neither they nor the time are given."""
 
 SOLVED, TIME_LIMIT, SAMPLE_LIMIT, NO_WAY = "solved", "time limit", "sample limit", "no way"
 """How a plan ends."""
@@ -58,9 +68,11 @@ class PlanResult:
     samples: int
     """Samples drawn; for OMPL's own planners the rounds of their main loop."""
     planning_time: float
-    """Time of the search alone, without set-up and compilation [s]."""
+    """Time of the search and the improvement alone, without set-up and compilation [s]."""
     make_tree: Callable[[], Tree] = field(repr=False)
     """Makes the tree out of the planner's memory."""
+    history: tuple[Found, ...] = ()
+    """When which trajectory was found, each better than the one before: rows of (time [s], duration [s], source)."""
 
     @property
     def solved(self) -> bool:
@@ -83,8 +95,14 @@ def plan(
     seed: int | None = None,
     time_limit: float = 5.0,
     progress: Progress | None = None,
+    *,
+    improve_for: float | None = None,
+    max_iterations: int | None = None,
+    objective: Objective | None = None,
+    callback: Callable[[Found], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
 ) -> PlanResult:
-    """Plan a trajectory from the scenario's start into its goal region.
+    """Plan a trajectory from the scenario's start into its goal region, and improve it if that is asked for.
 
     Args:
         scenario: world, robot, start, goal and settings; its ``max_samples`` ends a plan whatever the time limit.
@@ -92,6 +110,13 @@ def plan(
         seed: 0 or more; the same seed gives the same result. None draws a fresh one.
         time_limit: largest planning time [s].
         progress: called about ten times a second with the samples so far and the time since the start [s].
+        improve_for: time to improve the first trajectory for, from when it is found [s]; see
+            :func:`cbrrt_ompl.improve`. None improves nothing, unless ``max_iterations`` is given.
+        max_iterations: Newton steps to improve it for: the result is then the same on every run, unless the time ends
+            it. ``cb-rrt-anytime`` ends by them where ``improve_for`` is not given.
+        objective: what to improve; the duration if not given.
+        callback: called with each trajectory's time, duration and source, as they are found.
+        should_stop: asked every few milliseconds whether to end the improvement with the best so far.
 
     Returns:
         The result; "not solved" is a status of it and no error.
@@ -104,16 +129,45 @@ def plan(
         KeyboardInterrupt: on Ctrl-C, at once.
     """
     check_scenario(scenario)
-    planner_named(planner)
+    is_anytime = planner_named(planner).is_anytime
     _check_arguments(seed, time_limit, progress)
+    check_improvement(improve_for, max_iterations, objective, callback, should_stop, name="improve_for")
     check_step(scenario.robot, scenario.planning)
     warm_up_planner(planner)
+    improves = is_anytime or improve_for is not None or max_iterations is not None
+    if improves:
+        warm_up_improvement()
     watch = _Watch(time_limit, progress)
     if not scenario.goal.violations(scenario.start):
         return _already_there(scenario, planner, seed)
     watch.is_hopeless = lambda: has_no_way(scenario.world, scenario.robot.footprint, scenario.start, scenario.goal)
     if scenario.planning.approaches(scenario.goal):
         scenario = replace(scenario, goal=approachable_goal(scenario))
+    if not improves:
+        return _first_plan(scenario, planner, seed, watch)
+    if is_anytime and improve_for is None and max_iterations is None:
+        max_iterations = ANYTIME_ITERATIONS
+    improver = Improver(
+        scenario,
+        Objective() if objective is None else objective,
+        math.inf,
+        max_iterations,
+        callback,
+        should_stop,
+        is_kinematic=law_of(planner, scenario.planning) == STEERING,
+    )
+    budget = math.inf if improve_for is None else improve_for
+    if is_anytime:
+        return _plan_anytime(scenario, planner, seed, watch, improver, budget)
+    result = _first_plan(scenario, planner, seed, watch)
+    if result.trajectory is not None:
+        improver.begin(budget, watch.began)
+        improver.improve(result.trajectory, planner)
+    return _with_best(result, improver)
+
+
+def _first_plan(scenario: Scenario, planner: str, seed: int | None, watch: _Watch) -> PlanResult:
+    """What a planner finds first."""
     if is_compiled(planner):
         return _plan_compiled(scenario, planner, seed, watch)
     return _plan_in_ompl(scenario, planner, seed, watch)
@@ -122,6 +176,41 @@ def plan(
 def available_planners() -> list[str]:
     """Names of the planners that can plan here: all of them, or without OMPL the compiled ones."""
     return [name for name in PLANNERS if has_ompl() or is_compiled(name)]
+
+
+def _plan_anytime(
+    scenario: Scenario, planner: str, seed: int | None, watch: _Watch, improver: Improver, budget: float
+) -> PlanResult:
+    """The first plan of CB-RRT, or of the geodesic where that takes long; then guess after guess."""
+    first_seed = int(np.random.default_rng().integers(2**31)) if seed is None else seed
+    search, most = robust_search(scenario, first_seed), scenario.planning.max_samples
+    watch.start()
+    improver.begin(watch.left(), watch.began)
+    search.run(watch.should_stop, min(FIRST_SAMPLES, most))
+    if not search.has_reached_goal:
+        improver.run(geodesic_guesses(scenario))
+        if improver.best is None:
+            search.run(watch.should_stop, most)
+    result = _result_of(search, planner, seed, watch)
+    improver.begin(budget, watch.began)
+    if search.has_reached_goal:
+        improver.improve(search.trajectory(), planner)
+    if improver.best is not None:
+        improver.explore(further_guesses(scenario, first_seed, improver.has_ended))
+    return _with_best(result, improver)
+
+
+def _with_best(result: PlanResult, improver: Improver) -> PlanResult:
+    """A result with the best trajectory of an improver, if it has one."""
+    if improver.best is None:
+        return result
+    return replace(
+        result,
+        status=SOLVED,
+        trajectory=improver.best,
+        planning_time=improver.elapsed(),
+        history=tuple(improver.history),
+    )
 
 
 def warm_up_planner(planner: str) -> None:
@@ -138,6 +227,8 @@ def warm_up_planner(planner: str) -> None:
         from cbrrt_ompl.ompl_plugin import warm_up as plugin  # here, so that the compiled planners need no OMPL
 
         plugin.warm_up()
+    if planner_named(planner).is_anytime:
+        warm_up_improvement()
 
 
 def _check_arguments(seed: object, time_limit: object, progress: object) -> None:
@@ -169,6 +260,11 @@ def _plan_compiled(scenario: Scenario, planner: str, seed: int | None, watch: _W
     )
     watch.start()
     search.run(watch.should_stop, planning.max_samples)
+    return _result_of(search, planner, seed, watch)
+
+
+def _result_of(search: Search, planner: str, seed: int | None, watch: _Watch) -> PlanResult:
+    """What came of a search by the compiled loop."""
     planning_time = watch.elapsed()
     return PlanResult(
         planner=planner,
@@ -246,28 +342,32 @@ class _Watch:
         self._time_limit = time_limit
         self._progress = progress
         self.is_hopeless: Callable[[], bool] = lambda: False
-        self._began = self._next_report = 0.0
+        self.began = self._next_report = 0.0
         self._doubts_at = math.inf
 
     def start(self) -> None:
         """Begin to count the time."""
-        self._began = time.perf_counter()
-        self._next_report = self._began + PROGRESS_PERIOD
-        self._doubts_at = self._began + PATIENCE
+        self.began = time.perf_counter()
+        self._next_report = self.began + PROGRESS_PERIOD
+        self._doubts_at = self.began + PATIENCE
+
+    def left(self) -> float:
+        """Time that is left [s]."""
+        return self._time_limit - self.elapsed()
 
     def elapsed(self) -> float:
         """Time since the start [s]."""
-        return time.perf_counter() - self._began
+        return time.perf_counter() - self.began
 
     def should_stop(self, samples: int) -> bool:
         """Whether the time is up or there is no way; being Python code, this also lets a Ctrl-C through."""
         now = time.perf_counter()
-        if now - self._began >= self._time_limit:
+        if now - self.began >= self._time_limit:
             self.ended_by = TIME_LIMIT
             return True
         if self._progress is not None and now >= self._next_report:
             self._next_report = now + PROGRESS_PERIOD
-            self._progress(samples, now - self._began)
+            self._progress(samples, now - self.began)
         if now >= self._doubts_at:
             self._doubts_at = math.inf
             if self.is_hopeless():

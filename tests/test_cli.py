@@ -291,6 +291,31 @@ def test_show_draws_the_trajectory(
     assert drawn == [Trajectory.load(saved)]
 
 
+def test_improve_writes_a_shorter_trajectory_and_a_figure(
+    saved: Path, open_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    better, figure = tmp_path / "better.csv", tmp_path / "better.png"
+    files = ["--output", str(better), "--figure", str(figure)]
+    assert main(["improve", str(saved), str(open_file), "--max-iterations", "200", "--json", *files]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["duration"] < told["given"]
+    assert told["duration"] == pytest.approx(Trajectory.load(better).duration)
+    assert told["history"][-1]["duration"] == told["duration"]
+    assert figure.stat().st_size > 1000
+    assert main(["verify", str(better), str(open_file)]) == 0
+
+
+def test_plan_improves_on_request(open_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plain = ["plan", str(open_file), "--planner", "cb-rrt-compiled", "--seed", "1", "--json"]
+    assert main(plain) == 0
+    first = json.loads(capsys.readouterr().out)
+    assert main([*plain, "--max-iterations", "200"]) == 0
+    improved = json.loads(capsys.readouterr().out)
+    assert first["history"] == []
+    assert improved["history"][0]["duration"] == first["duration"]
+    assert improved["duration"] < first["duration"]
+
+
 def test_planners_lists_every_planner(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["planners"]) == 0
     lines = capsys.readouterr().out.splitlines()

@@ -147,6 +147,7 @@ def test_the_scenario_on_the_scenario_page_can_be_loaded(docs: Path, tmp_path: P
         pytest.param("getting-started.md", marks=pytest.mark.needs_ompl),
         "own-map.md",
         "robot.md",
+        "improve.md",
         pytest.param("faq.md", marks=pytest.mark.needs_ompl),
     ],
 )

@@ -72,6 +72,12 @@ def add_time_limit(parser: argparse.ArgumentParser, meaning: str) -> None:
     parser.add_argument("--time-limit", type=seconds, default=5.0, metavar="S", help=text)
 
 
+def add_iterations(parser: argparse.ArgumentParser) -> None:
+    """``--max-iterations`` of an improvement."""
+    text = "steps of the solver to improve for: the same result on every run"
+    parser.add_argument("--max-iterations", type=count, metavar="N", help=text)
+
+
 def add_jobs(parser: argparse.ArgumentParser) -> None:
     """``--jobs``."""
     parser.add_argument("--jobs", type=count, metavar="J", help="processes at a time (default: one a processor)")

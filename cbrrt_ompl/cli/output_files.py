@@ -11,6 +11,7 @@ from cbrrt_ompl.errors import InputError, Problem
 
 SUFFIXES = {
     "trajectory": (".csv", ".npz", ".json"),
+    "output": (".csv", ".npz", ".json"),
     "figure": (".png", ".pdf", ".svg"),
     "animation": (".gif", ".html", ".mp4"),
     "database": (".db", ".sqlite", ".sqlite3"),

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 from cbrrt_ompl.cli.arguments import (
     Commands,
     add_command,
+    add_iterations,
     add_json,
     add_planner,
     add_scenario,
     add_seed,
     add_time_limit,
+    seconds,
 )
 from cbrrt_ompl.cli.exit_codes import DONE, FAILED
 from cbrrt_ompl.cli.output import heading, print_json, print_values
@@ -39,6 +41,9 @@ def add_parser(commands: Commands) -> None:
     add_planner(parser, None, f"cb-rrt; in a map {MAP_PLANNERS[0]}")
     add_seed(parser)
     add_time_limit(parser, "planning time")
+    text = "then improve the trajectory by optimal control, for this long at most [s]"
+    parser.add_argument("--improve-for", type=seconds, metavar="S", help=text)
+    add_iterations(parser)
     add_output_files(parser, FILES)
     add_json(parser)
     add_problem(parser)
@@ -52,9 +57,10 @@ def run(arguments: argparse.Namespace) -> int:
 
     scenario = given_scenario(arguments)
     planner = arguments.planner or (map_planner() if is_map(arguments.scenario) else "cb-rrt")
-    warm_up(planner)
+    limits = {"improve_for": arguments.improve_for, "max_iterations": arguments.max_iterations}
+    warm_up(planner, improves=any(limit is not None for limit in limits.values()))
     with plan_progress(scenario.planning.max_samples, planner) as progress:
-        result = plan(scenario, planner, arguments.seed, arguments.time_limit, progress=progress)
+        result = plan(scenario, planner, arguments.seed, arguments.time_limit, progress, **limits)
     trajectory = result.trajectory
     if arguments.trajectory is not None and trajectory is not None:
         trajectory.save(arguments.trajectory)
@@ -89,6 +95,7 @@ def _data(result: PlanResult) -> dict[str, Any]:
         "duration": None if trajectory is None else trajectory.duration,
         "length": None if trajectory is None else trajectory.length,
         "point_turns": None if trajectory is None else len(trajectory.point_turns),
+        "history": [row._asdict() for row in result.history],
     }
 
 
@@ -106,4 +113,8 @@ def _values(data: dict[str, Any]) -> dict[str, str]:
             "length": f"{data['length']:.2f} m",
             "point turns": f"{data['point_turns']}",
         }
+    if len(data["history"]) > 1:
+        first = data["history"][0]
+        values["first"] = f"{first['duration']:.2f} s after {1e3 * first['time']:.2f} ms"
+        values["last"] = f"after {1e3 * data['history'][-1]['time']:.2f} ms, {data['history'][-1]['source']}"
     return values

@@ -18,6 +18,7 @@ from cbrrt_ompl.cli import (
     completion,
     demo,
     drive,
+    improve,
     new,
     plan,
     planners,
@@ -33,7 +34,7 @@ from cbrrt_ompl.cli.output import print_error
 from cbrrt_ompl.errors import CbrrtError, Problem
 
 COMMANDS = (
-    plan, drive, verify, show, new, planners, robots, scenarios, bench, report, reproduce, demo, completion,
+    plan, improve, drive, verify, show, new, planners, robots, scenarios, bench, report, reproduce, demo, completion,
 )  # fmt: skip
 """The modules of the commands, in the order of the help."""
 

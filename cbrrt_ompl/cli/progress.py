@@ -12,8 +12,13 @@ LINE = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}<{remaining}, {rate_fmt}]"
 """A progress line: how many of how many, the time since the beginning and the time left."""
 
 
-def warm_up(planner: str) -> None:
-    """Load the kernels of a planner, and say so on a terminal where they must be compiled first."""
+def warm_up(planner: str | None, improves: bool = False) -> None:
+    """Load the kernels of a planner, and say so on a terminal where they must be compiled first.
+
+    Args:
+        planner: its name; None for none.
+        improves: whether trajectories are to be improved.
+    """
     from cbrrt_ompl import planning
 
     message = "cbrrt: compiling the planners, once after installation ..."
@@ -22,7 +27,10 @@ def warm_up(planner: str) -> None:
     if sys.stderr.isatty():
         timer.start()
     try:
-        planning.warm_up_planner(planner)
+        if planner is not None:
+            planning.warm_up_planner(planner)
+        if improves:
+            planning.warm_up_improvement()
     finally:
         timer.cancel()
 

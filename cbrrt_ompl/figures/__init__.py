@@ -14,6 +14,7 @@ from cbrrt_ompl.figures.figures import (
     draw_velocities,
     draw_world,
 )
+from cbrrt_ompl.figures.improvement import draw_history, draw_improvement
 from cbrrt_ompl.figures.maps import draw_draft, draw_map
 
 __all__ = [
@@ -22,6 +23,8 @@ __all__ = [
     "draw_drive",
     "draw_extension",
     "draw_map",
+    "draw_history",
+    "draw_improvement",
     "draw_plan",
     "draw_scene",
     "draw_trajectory",

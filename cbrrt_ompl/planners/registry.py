@@ -42,6 +42,8 @@ class Planner:
     steering: Steering
     is_robust: bool = False
     """Whether places are passed over the likelier, the more extensions from there have failed."""
+    is_anytime: bool = False
+    """Whether it goes on after its first plan (in OMPL's own set-up and benchmark its first plan is all there is)."""
     ompl_class: str = "RRT"
     """Name of its class in ``ompl.control``."""
 
@@ -64,6 +66,13 @@ PLANNERS: dict[str, Planner] = {
     "s-rrt-compiled": Planner("S-RRT as one compiled loop", _COMPILED, _RATES),
     "cb-rrt-robust": Planner(
         "cb-rrt-compiled that passes over nodes extended in vain: for real maps", _COMPILED, _KANAYAMA, is_robust=True
+    ),
+    "cb-rrt-anytime": Planner(
+        "cb-rrt-robust, and then better and better by optimal control",
+        _COMPILED,
+        _KANAYAMA,
+        is_robust=True,
+        is_anytime=True,
     ),
     "rrt": Planner("OMPL's control::RRT with random controls", _OMPL, _RANDOM),
     "kpiece1": Planner("OMPL's KPIECE1", _OMPL, _RANDOM, ompl_class="KPIECE1"),

@@ -1,0 +1,106 @@
+"""What an optimised motion is checked by: the only place of this wing that knows how collision is decided."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cbrrt_ompl.collision.clearance import ENOUGH, clearance, clearances_at
+from cbrrt_ompl.collision.motion_check import check_step_motion, is_free
+from cbrrt_ompl.collision.scene import Scene
+from cbrrt_ompl.motion.kinematics import brake
+from cbrrt_ompl.motion.model import motion_room
+from cbrrt_ompl.motion.records import Record
+from cbrrt_ompl.optimise.cover import cover
+from cbrrt_ompl.optimise.field import distance_at, field_of
+from cbrrt_ompl.optimise.kernels import kernel
+from cbrrt_ompl.problem.settings import MAX_STEPS
+from cbrrt_ompl.scenario.scenario import Scenario
+
+
+def least_clearance(scenario: Scenario) -> float:
+    """Distance that the motions of a scenario keep from everything [m]."""
+    return motion_room(scenario.planning.clearance)
+
+
+def is_motion_free(states: NDArray[np.float64], dt: float, scenario: Scenario, *, is_kinematic: bool = False) -> bool:
+    """Whether the planners would accept a motion.
+
+    Args:
+        states: rows of (x, y, theta, v, omega), shape (n, 5); between the rows the velocities are linear in time.
+        dt: time between two rows [s].
+        scenario: world and footprint.
+        is_kinematic: whether the velocities jump instead, at each row to those of the next one.
+    """
+    scene, room = scenario.world.scene(scenario.robot.footprint), least_clearance(scenario)
+    if is_kinematic:
+        return bool(are_jumps_free(np.ascontiguousarray(states), dt, scene, room))
+    return is_free(states, dt, scene, room)
+
+
+@kernel
+def are_jumps_free(states: NDArray[np.float64], dt: float, scene: Scene, room: float) -> bool:
+    """Whether a motion is free in which each row holds the velocities of the step that leads to it."""
+    distance, any_heading = clearance(scene, states[0, 0], states[0, 1], states[0, 2], ENOUGH)
+    margin = max(distance - room, 0.0)
+    for i in range(1, len(states)):
+        v, omega = states[i, 3], states[i, 4]
+        start = (states[i - 1, 0], states[i - 1, 1], states[i - 1, 2], v, omega)
+        end = (states[i, 0], states[i, 1], states[i, 2], v, omega)
+        margin, any_heading = check_step_motion(start, end, margin, any_heading, scene, room, dt)
+        if margin <= 0.0:
+            return False
+    return distance > 0.0
+
+
+def clearances(states: NDArray[np.float64], scenario: Scenario) -> NDArray[np.float64]:
+    """Exact distances of the footprint from everything, below 0 where it touches something, shape (n,) [m].
+
+    Args:
+        states: rows that begin with (x, y, theta), shape (n, 3) or more [m, m, rad].
+        scenario: world and footprint.
+    """
+    found: NDArray[np.float64] = clearances_at(
+        scenario.world.scene(scenario.robot.footprint), np.ascontiguousarray(states)
+    )
+    return found
+
+
+def unsafe_rows(states: NDArray[np.float64], scenario: Scenario) -> NDArray[np.bool_]:
+    """From which states the robot cannot brake to rest without collision, shape (n,)."""
+    step = scenario.planning.step
+    found = np.zeros(len(states), dtype=np.bool_)
+    for row, (x, y, theta, v, omega) in enumerate(states.tolist()):
+        braking = brake(x, y, theta, v, omega, scenario.robot.limits, step, MAX_STEPS)
+        found[row] = not is_motion_free(braking, step, scenario)
+    return found
+
+
+def disc_distances(poses: NDArray[np.float64], scenario: Scenario) -> NDArray[np.float64]:
+    """Distances of the discs that stand for the footprint, by the distance field, shape (n, discs) [m].
+
+    Args:
+        poses: rows that begin with (x, y, theta), shape (n, 3) or more [m, m, rad].
+        scenario: world and footprint.
+    """
+    grid, distances = field_of(scenario.world)
+    discs = cover(scenario.robot.footprint)
+    found: NDArray[np.float64] = disc_distances_in(grid, distances, discs, np.ascontiguousarray(poses))
+    return found
+
+
+@kernel
+def disc_distances_in(
+    grid: Record, distances: NDArray[np.float32], discs: NDArray[np.float64], poses: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Distances of discs from everything at poses, shape (n, discs) [m]."""
+    found = np.empty((len(poses), len(discs)))
+    for k in range(len(poses)):
+        cosine, sine = math.cos(poses[k, 2]), math.sin(poses[k, 2])
+        for i in range(len(discs)):
+            x = poses[k, 0] + cosine * discs[i, 0] - sine * discs[i, 1]
+            y = poses[k, 1] + sine * discs[i, 0] + cosine * discs[i, 1]
+            found[k, i] = distance_at(grid, distances, x, y) - discs[i, 2]
+    return found

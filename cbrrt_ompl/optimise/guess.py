@@ -1,0 +1,101 @@
+"""A guess for the solver: states and controls of N intervals, which need not fit together."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cbrrt_ompl.optimise.program import STEP, THETA
+from cbrrt_ompl.problem.robot import Limits
+from cbrrt_ompl.trajectory.trajectory import Trajectory
+
+INTERVAL = 0.4
+"""Duration of an interval of a guess at most, as far as the number of intervals allows [s]."""
+
+TURN = 0.7
+"""Turn in an interval at most, for the same [rad]: the rule that integrates it is then good to 1e-5 of the path."""
+
+FEWEST, MOST = 45, 300
+"""Range of the number of intervals."""
+
+EXPECTED_FRACTION = 0.6
+"""What an optimisation makes of the duration of a plan: its intervals are to have the usual duration then."""
+
+
+class Guess(NamedTuple):
+    """States and controls for the solver to start from."""
+
+    states: NDArray[np.float64]
+    """Rows of (x, y, theta, v, omega, h), theta without jumps, shape (N + 1, 6)."""
+    controls: NDArray[np.float64]
+    """Rows of (a, alpha), shape (N, 2)."""
+    source: str
+    """Where it comes from."""
+
+    @property
+    def duration(self) -> float:
+        """Of all intervals [s]."""
+        return float(len(self.controls) * self.states[0, STEP])
+
+
+def interval_count(duration: float, limits: Limits) -> int:
+    """Intervals for a motion of some seconds."""
+    fastest = max(limits.omega_max, -limits.omega_min)
+    return int(min(max(math.ceil(duration / min(INTERVAL, TURN / fastest)), FEWEST), MOST))
+
+
+def guess_from_trajectory(trajectory: Trajectory, limits: Limits, source: str) -> Guess:
+    """The states of a trajectory, evenly in time, and the velocities' mean changes between them."""
+    n = interval_count(EXPECTED_FRACTION * trajectory.duration, limits)
+    times = np.linspace(trajectory.t[0], trajectory.t[-1], n + 1)
+    states = trajectory.at(times)
+    states[:, THETA] = np.unwrap(states[:, THETA])
+    return with_controls(states, trajectory.duration / n, source)
+
+
+def guess_from_path(path: NDArray[np.float64], start: ArrayLike, limits: Limits, source: str) -> Guess:
+    """A guess along timed poses.
+
+    Args:
+        path: rows of (time, x, y, theta), the times increasing from 0, theta without jumps, shape (n, 4).
+        start: state to begin with, shape (5,).
+        limits: of the robot.
+        source: name of the guess.
+    """
+    duration = path[-1, 0]
+    n = interval_count(duration, limits)
+    h = duration / n
+    times = np.linspace(0.0, duration, n + 1)
+    x, y, theta = (np.interp(times, path[:, 0], path[:, i]) for i in (1, 2, 3))
+    v = np.gradient(x, h) * np.cos(theta) + np.gradient(y, h) * np.sin(theta)
+    states = np.column_stack([x, y, theta, smoothed(v), smoothed(np.gradient(theta, h))])
+    states[0] = start
+    return with_controls(states, h, source)
+
+
+def with_controls(states: NDArray[np.float64], h: float, source: str) -> Guess:
+    """A guess of states, shape (N + 1, 5), that follow each other by h seconds."""
+    controls = np.diff(states[:, 3:5], axis=0) / h
+    return Guess(np.column_stack([states, np.full(len(states), h)]), controls, source)
+
+
+def refined(guess: Guess) -> Guess:
+    """The same motion in twice as many intervals."""
+    n = len(guess.controls)
+    h = 0.5 * guess.states[0, STEP]
+    states = np.empty((2 * n + 1, 6))
+    states[::2] = guess.states
+    before, a = guess.states[:-1], guess.controls
+    states[1::2] = 0.5 * (guess.states[1:] + before)
+    states[1::2, THETA] = before[:, THETA] + h * before[:, 4] + 0.5 * h * h * a[:, 1]
+    states[:, STEP] = h
+    return Guess(states, np.repeat(a, 2, axis=0), guess.source)
+
+
+def smoothed(values: NDArray[np.float64], width: int = 5) -> NDArray[np.float64]:
+    """Means over some neighbours, shape (n,)."""
+    padded = np.pad(values, width // 2, mode="edge")
+    return np.convolve(padded, np.full(width, 1.0 / width), "valid")

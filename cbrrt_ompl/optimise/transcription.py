@@ -1,0 +1,225 @@
+"""From a scenario to the optimal control problem that the kernels solve, and back to a trajectory."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cbrrt_ompl.motion.kinematics import clamp, unicycle_step
+from cbrrt_ompl.motion.records import Record, record_array
+from cbrrt_ompl.optimise.clearance import least_clearance
+from cbrrt_ompl.optimise.cover import cover
+from cbrrt_ompl.optimise.field import field_of
+from cbrrt_ompl.optimise.guess import Guess
+from cbrrt_ompl.optimise.inequalities import lay_out_rows
+from cbrrt_ompl.optimise.interior_point import PROGRESS, SOLVE_RUNNING, iterate
+from cbrrt_ompl.optimise.kernels import kernel
+from cbrrt_ompl.optimise.objective import Objective
+from cbrrt_ompl.optimise.program import OMEGA, PROBLEM, STAGE, STEP, THETA, V
+from cbrrt_ompl.problem.robot import Limits
+from cbrrt_ompl.problem.settings import Goal
+from cbrrt_ompl.scenario.scenario import Scenario
+from cbrrt_ompl.trajectory.trajectory import Trajectory
+
+INSIDE = 1.0 - 1e-6
+"""Fraction of a limit that is used: the solver is precise to 1e-5, and the roll-out clamps the rest."""
+
+SPARE_MARGIN = 0.002
+"""What the discs keep beyond the least clearance at first [m]: they do not cover all, nor does the field know all."""
+
+SPARE_FRACTION, SPARE_TOLERANCE = 0.1, 0.002
+"""What is left unused of a tolerance of the goal: this fraction, or this much where it is less [m, rad, m/s, rad/s]."""
+
+REGULARISATION = 2e-3
+"""Smoothness that the solver adds to every objective: it picks one of many motions that take the same time."""
+
+WARM = 0.01
+"""Barrier parameters below this are for guesses that are nearly solutions."""
+
+LEAST_SLACK, LEAST_WARM_SLACK = 0.05, 1e-3
+"""What a slack starts with at least: from a mere guess, and from a solution of a like problem."""
+
+SHORTEST_STEP = 1e-3
+"""Least duration of an interval [s]."""
+
+ITERATIONS_AT_ONCE = 16
+"""Newton steps between two looks at the clock."""
+
+
+@dataclass
+class Solution:
+    """What the solver made of a guess."""
+
+    guess: Guess
+    """States and controls, to start from again."""
+    infeasibility: float
+    """Largest violation of a constraint [m, rad, m/s, rad/s]."""
+    cost: float
+    """What it costs at least without the regularisation, which is at most a fraction of that [s]."""
+    iterations: int
+    """Newton steps that it took."""
+
+
+class Transcription:
+    """The problem of one scenario; margins and speed caps differ from solution to solution."""
+
+    def __init__(self, scenario: Scenario, objective: Objective, *, is_kinematic: bool = False) -> None:
+        """Gather what does not change."""
+        self.scenario, self.objective, self.is_kinematic = scenario, objective, is_kinematic
+        limits = scenario.robot.limits
+        velocities, accelerations = velocity_rows(limits), acceleration_rows(limits)
+        problem = record_array(1, PROBLEM)[0]
+        fill_rows(problem, "velocity_limit", np.empty((0, 3)) if is_kinematic else velocities)
+        fill_rows(problem, "control_limit", velocities if is_kinematic else accelerations)
+        fill_rows(problem, "disc", cover(scenario.robot.footprint))
+        problem["grid"], self._distances = field_of(scenario.world)
+        problem["is_kinematic"], problem["shortest_step"] = is_kinematic, SHORTEST_STEP
+        self._problem, self._goal_theta = problem, scenario.goal.theta or 0.0
+        fill_goal(problem, scenario.goal)
+        fill_weights(problem, objective, limits)
+        self.margin = least_clearance(scenario) + SPARE_MARGIN
+
+    def solve(
+        self,
+        guess: Guess,
+        margins: NDArray[np.float64],
+        speed_caps: NDArray[np.float64],
+        barrier: float,
+        last_barrier: float,
+        may_iterate: Callable[[int], int],
+    ) -> Solution:
+        """Improve a guess.
+
+        Args:
+            guess: states and controls.
+            margins: distance to keep at each state, shape (N + 1,) [m].
+            speed_caps: fraction of the velocity limits to use at each state, shape (N + 1,).
+            barrier: first value of the barrier parameter, see :mod:`cbrrt_ompl.optimise.interior_point`.
+            last_barrier: its last value.
+            may_iterate: takes the number of Newton steps so far and says how many more there may be.
+        """
+        stages = record_array(len(guess.states), STAGE)
+        stages["state"] = guess.states
+        stages["control"][:-1] = guess.states[1:, V : OMEGA + 1] if self.is_kinematic else guess.controls
+        stages["margin"], stages["speed_cap"] = margins, speed_caps
+        progress = record_array(1, PROGRESS)[0]
+        progress["barrier"], progress["last_barrier"], progress["penalty"] = barrier, last_barrier, 1.0
+        turns = round((guess.states[-1, THETA] - self._goal_theta) / math.tau)
+        problem, distances = self._problem.copy(), self._distances
+        problem["goal_theta"] = self._goal_theta + turns * math.tau  # the solver knows no wrapped angles
+        progress["least_slack"] = LEAST_SLACK if barrier > WARM else LEAST_WARM_SLACK
+        lay_out_rows(problem, stages)
+        while progress["status"] <= SOLVE_RUNNING:
+            allowed = may_iterate(int(progress["iterations"]))
+            if allowed <= 0:
+                break
+            iterate(problem, distances, stages, progress, min(allowed, ITERATIONS_AT_ONCE))
+        found = Guess(stages["state"].copy(), stages["control"][:-1].copy(), guess.source)
+        cost = float(progress["cost"]) / (1.0 + REGULARISATION)
+        return Solution(found, float(progress["infeasibility"]), cost, int(progress["iterations"]))
+
+    def trajectory(self, guess: Guess) -> Trajectory:
+        """The motion that the controls of a solution lead to, integrated exactly from the scenario's start.
+
+        Its rows are evenly spaced, at most an integration step apart.
+        """
+        limits, h = self.scenario.robot.limits, float(guess.states[0, STEP])
+        parts = max(1, math.ceil(h / self.scenario.planning.step - 1e-9))
+        begin = np.array(self.scenario.start, dtype=float)
+        states = roll_out(begin, guess.controls, h / parts, parts, limits, self.is_kinematic)
+        commands = np.concatenate([states[1:, 3:], states[-1:, 3:]])
+        t: NDArray[np.float64] = h / parts * np.arange(len(states), dtype=float)
+        return Trajectory(t, *states.T, *commands.T, kinematic=self.is_kinematic, limits=limits)
+
+
+def fill_rows(problem: Record, name: str, rows: NDArray[np.float64]) -> None:
+    """Enter rows of three numbers and their count into the record of a problem."""
+    problem[f"{name}s"][: len(rows)], problem[f"{name}_count"] = rows, len(rows)
+
+
+def fill_goal(problem: Record, goal: Goal) -> None:
+    """Enter the goal region, drawn in so that rounding does not leave it."""
+
+    def drawn_in(tolerance: float) -> float:
+        return tolerance - min(SPARE_FRACTION * tolerance, SPARE_TOLERANCE)
+
+    problem["goal_x"], problem["goal_y"], problem["goal_tolerance"] = goal.x, goal.y, drawn_in(goal.tolerance)
+    problem["heading_tolerance"] = math.inf if goal.theta is None else drawn_in(goal.heading_tolerance)
+    problem["speed_tolerance"] = math.inf if goal.speed_tolerance is None else drawn_in(goal.speed_tolerance)
+
+
+def velocity_rows(limits: Limits) -> NDArray[np.float64]:
+    """Rows (c, c_v, c_omega) with c + c_v v + c_omega omega >= 0 within all limits, shape (n, 3)."""
+    rows = [
+        (limits.v_max, -1.0, 0.0),
+        (-limits.v_min, 1.0, 0.0),
+        (limits.omega_max, 0.0, -1.0),
+        (-limits.omega_min, 0.0, 1.0),
+    ]
+    return _inside([*rows, *_wheel_rows(limits.wheel_speed, limits)])
+
+
+def acceleration_rows(limits: Limits) -> NDArray[np.float64]:
+    """Rows (c, c_a, c_alpha) with c + c_a a + c_alpha alpha >= 0 within all limits, shape (n, 3)."""
+    rows = [(limits.acceleration, sign, 0.0) for sign in (-1.0, 1.0)]
+    rows += [(limits.angular_acceleration, 0.0, sign) for sign in (-1.0, 1.0)]
+    return _inside([*rows, *_wheel_rows(limits.wheel_acceleration, limits)])
+
+
+def _wheel_rows(most: float, limits: Limits) -> list[tuple[float, float, float]]:
+    """Both signs of both wheels: |c_v| + |c_omega| wheel_separation / 2 at most some limit."""
+    arm = 0.5 * limits.wheel_separation
+    return [(most, a, b * arm) for a in (-1.0, 1.0) for b in (-1.0, 1.0)] if most < math.inf else []
+
+
+def _inside(rows: list[tuple[float, float, float]]) -> NDArray[np.float64]:
+    """The rows with their limits drawn in by rounding."""
+    limits = np.array(rows)
+    limits[:, 0] *= INSIDE
+    return limits
+
+
+def fill_weights(problem: Record, objective: Objective, limits: Limits) -> None:
+    """Enter the weights of an objective for one robot, and the regularisation."""
+    problem["duration_weight"], problem["length_weight"] = objective.duration, objective.length
+    problem["room_weight"], problem["room_distance"] = objective.room, objective.room_distance
+    smoothness = 2.0 * objective.smoothness + REGULARISATION * (objective.duration + objective.length * limits.v_max)
+    a_max, alpha_max = limits.acceleration, limits.angular_acceleration
+    if problem["is_kinematic"]:
+        a_max, alpha_max = limits.v_max - limits.v_min, limits.omega_max - limits.omega_min
+    problem["smoothness_a"], problem["smoothness_alpha"] = smoothness / a_max**2, smoothness / alpha_max**2
+
+
+@kernel
+def roll_out(
+    begin: NDArray[np.float64],
+    controls: NDArray[np.float64],
+    dt: float,
+    parts: int,
+    limits: Limits,
+    is_kinematic: bool,
+) -> NDArray[np.float64]:
+    """States (x, y, theta, v, omega) under controls, several rows a control, the limits of the velocities kept."""
+    states = np.empty((len(controls) * parts + 1, 5))
+    states[0] = begin
+    x, y, theta, v, omega = begin[0], begin[1], begin[2], begin[3], begin[4]
+    for k in range(len(controls)):
+        v_before, omega_before, first, second = v, omega, controls[k, 0], controls[k, 1]
+        for i in range(1, parts + 1):
+            if is_kinematic:
+                v_next, omega_next = first, second
+            else:
+                v_next, omega_next = v_before + first * dt * i, omega_before + second * dt * i
+            v_next = clamp(v_next, limits.v_min, limits.v_max)
+            omega_next = clamp(omega_next, limits.omega_min, limits.omega_max)
+            if is_kinematic:
+                v, omega = v_next, omega_next
+            x, y, theta = unicycle_step(x, y, theta, v, omega, v_next, omega_next, dt)
+            v, omega = v_next, omega_next
+            row = states[k * parts + i]
+            row[0], row[1], row[2], row[3], row[4] = x, y, theta, v, omega
+    return states
