@@ -22,7 +22,9 @@ ENOUGH = 0.1
 
 @njit(cache=True, inline="always")
 def wall_distance(frame: Record, x: float, y: float) -> float:
-    """Distance of a point from the bounds, negative outside [m]."""
+    """Distance of a point from the bounds [m]; `OUTSIDE` outside, and for NaN."""
+    if not (frame.x_min < x < frame.x_max and frame.y_min < y < frame.y_max):  # NaN is not, and min() may ignore it
+        return OUTSIDE
     return min(min(x - frame.x_min, frame.x_max - x), min(y - frame.y_min, frame.y_max - y))
 
 
