@@ -76,6 +76,7 @@ def nearest_thing(world: World, footprint: Footprint, pose: Sequence[float], kno
 def _what_is_there(world: World, area: Any, source: MapSource | None) -> str:
     """The unknown cells, the wall or the obstacle that an area touches, and how deep."""
     from_map = 0 if source is None else source.obstacles
+    cells = "occupied cells of the map" + (" or of its keepout mask" if source is not None and source.keepout else "")
     touched = _touched(world, area)
     unknown = "" if source is None else _unknown_cells(area, source)
     if unknown and all(index < from_map for index in touched):
@@ -85,7 +86,7 @@ def _what_is_there(world: World, area: Any, source: MapSource | None) -> str:
         depth = _depth(area, _shape(world.obstacles[index]))
         if depth > deepest:
             place = world.obstacles[index]
-            kind = type(place).__name__.lower() if index >= from_map else "occupied cells of the map"
+            kind = type(place).__name__.lower() if index >= from_map else cells
             number = f"obstacles[{index - from_map}], a {kind}" if index >= from_map else kind
             name, deepest = number, depth
     low, high = world.bounds.min, world.bounds.max
