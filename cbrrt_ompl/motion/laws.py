@@ -253,8 +253,8 @@ def _called_back(law: Law) -> Any:
     def call(x: float, y: float, theta: float, limits: int, gains: int, command: int) -> None:
         out = (ctypes.c_double * 2).from_address(command)
         try:
-            command = law.function((x, y, theta), _tuple_at(limits, Limits), _tuple_at(gains, Gains))
-            out[0], out[1] = _finite(law.name, command)
+            found = law.function((x, y, theta), _tuple_at(limits, Limits), _tuple_at(gains, Gains))
+            out[0], out[1] = _finite(law.name, found)
         except BaseException as error:  # a C function cannot raise; raise_errors does
             law.errors.append(error)
             out[0] = out[1] = 0.0
