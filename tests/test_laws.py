@@ -106,16 +106,41 @@ def test_an_extension_is_drawn_by_its_law() -> None:
     assert trajectory.omega_command[0] == pytest.approx(min(omega, EASY.robot.limits.omega_max))
 
 
-@pytest.mark.parametrize("planner", PLANNERS)
-def test_an_exception_in_a_law_reaches_the_caller(planner: str) -> None:
-    def failing(error: Error, limits: Any, gains: Any) -> tuple[float, float]:
-        if error[0] != 1.0:
-            raise LookupError({"on": "purpose"})
-        return 1.0, 0.0
+def failing(error: Error, limits: Any, gains: Any) -> tuple[float, float]:
+    """Is compiled, and raises."""
+    if error[0] != 1.0:
+        raise LookupError("on purpose")
+    return 1.0, 0.0
 
-    register_law("failing", failing)
-    with pytest.raises(LookupError, match="purpose"):
+
+def failing_in_python(error: Error, limits: Any, gains: Any) -> tuple[float, float]:
+    """Is not compiled, and raises."""
+    return in_python(failing(error, limits, gains) + (0.0,), limits, gains)
+
+
+def divides(error: Error, limits: Any, gains: Any) -> tuple[float, float]:
+    return 1.0, 1.0 / (1.0 - (error[0] != 1.0))
+
+
+def infinite(error: Error, limits: Any, gains: Any) -> tuple[float, float]:
+    return (1.0 if error[0] == 1.0 else math.inf), 0.0
+
+
+@pytest.mark.parametrize(
+    ("law", "expected"),
+    [
+        (failing, LookupError),
+        (failing_in_python, LookupError),
+        (divides, ZeroDivisionError),
+        (infinite, ArithmeticError),
+    ],
+)
+@pytest.mark.parametrize("planner", PLANNERS)
+def test_an_exception_in_a_law_reaches_the_caller(planner: str, law: Any, expected: type[Exception]) -> None:
+    register_law("failing", law)
+    with pytest.raises(expected):
         plan(by("failing"), planner, seed=1)
+    assert plan(by("posq"), planner, seed=1).solved
 
 
 @pytest.mark.parametrize("compiled", [False, True])

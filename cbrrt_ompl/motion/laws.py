@@ -22,6 +22,7 @@ from numba import carray, cfunc, config, njit, types
 from numba.core import cgutils
 from numba.core.errors import NumbaError
 from numba.extending import intrinsic, overload
+from numpy.typing import NDArray
 
 from cbrrt_ompl.errors import InputError, Problem, SettingsError
 from cbrrt_ompl.problem.robot import Gains, Limits
@@ -58,6 +59,22 @@ class Law:
     """What must live as long as the address is used."""
     errors: list[BaseException] = field(default_factory=list, repr=False)
     """What a Python law has raised and nobody has seen yet."""
+    failure: NDArray[np.float64] = field(default_factory=lambda: np.zeros(4), repr=False)
+    """A 1 and the error posture at which a compiled law has failed last, shape (4,)."""
+
+    def raise_errors(self) -> None:
+        """Raise what went wrong since the last time, if anything."""
+        if self.errors:
+            error = self.errors[0]
+            self.errors.clear()
+            raise error
+        if self.failure[0]:
+            self.failure[0] = 0.0
+            posture = tuple(self.failure[1:].tolist())
+            command = getattr(self.function, "py_func", self.function)(posture, Limits(), Gains())  # raises it again
+            raise ArithmeticError(
+                f"law {self.name!r} gave no finite command at {posture}, or {command} by default limits"
+            )
 
 
 _laws: dict[str, Law] = {}
@@ -91,9 +108,10 @@ def register_law(name: str, function: LawFunction) -> None:
     if not callable(function):
         raise InputError(Problem("function", function, "a function of an error posture, limits and gains"))
     _check_command(function)
-    compiled = _compiled(function)
+    failure = np.zeros(4)
+    compiled = _compiled(function, failure)
     if compiled is not None:
-        _laws[name] = Law(name, function, True, compiled.address, compiled)
+        _laws[name] = Law(name, function, True, compiled.address, (compiled, failure), failure=failure)
         return
     law = Law(name, function, False, 0, None)
     law.keep = _called_back(law)
@@ -140,12 +158,9 @@ def is_compiled_law(name: str) -> bool:
 
 
 def raise_errors() -> None:
-    """Raise what a law in Python has raised since the last time, if anything: kernels cannot."""
+    """Raise what a law has raised since the last time, if anything: kernels cannot."""
     for law in _laws.values():
-        if law.errors:
-            error = law.errors[0]
-            law.errors.clear()
-            raise error
+        law.raise_errors()
 
 
 # from process to process
@@ -196,16 +211,35 @@ def _check_command(function: LawFunction) -> None:
         raise InputError(Problem("function", command, "a command (v, omega) of two finite numbers for (1, 0.2, 0.1)"))
 
 
-def _compiled(function: LawFunction) -> Any:
-    """The law as a C function; None where numba cannot compile it."""
+def _compiled(function: LawFunction, failure: NDArray[np.float64]) -> Any:
+    """The law as a C function; None where numba cannot compile it.
+
+    Args:
+        function: the law.
+        failure: takes a 1 and the error posture where it raised an exception or gave no finite command, shape (4,).
+    """
     if getattr(config, "DISABLE_JIT", False):
         return None
     law = function if hasattr(function, "py_func") else njit(function)
+    failure_address = failure.ctypes.data
+
+    @njit
+    def call_safely(x: float, y: float, theta: float, limits: Any, gains: Any, out: Any) -> None:
+        out[0] = out[1] = math.nan
+        try:
+            v, omega = law((x, y, theta), limits, gains)
+            out[0], out[1] = v, omega
+        except Exception:  # a C function cannot raise; raise_errors does
+            out[0] = math.nan
 
     def call(x: float, y: float, theta: float, limits: int, gains: int, command: int) -> None:
-        v, omega = law((x, y, theta), carray(_pointer(limits), 1, LIMITS)[0], carray(_pointer(gains), 1, GAINS)[0])
         out = carray(_pointer(command), 2, np.float64)
-        out[0], out[1] = v, omega
+        limits_record, gains_record = carray(_pointer(limits), 1, LIMITS)[0], carray(_pointer(gains), 1, GAINS)[0]
+        call_safely(x, y, theta, limits_record, gains_record, out)
+        if not math.isfinite(out[0] + out[1]):
+            out[0] = out[1] = 0.0
+            failed = carray(_pointer(failure_address), 4, np.float64)
+            failed[0], failed[1], failed[2], failed[3] = 1.0, x, y, theta
 
     try:
         return cfunc(_LAW_SIGNATURE)(call)
@@ -219,12 +253,20 @@ def _called_back(law: Law) -> Any:
     def call(x: float, y: float, theta: float, limits: int, gains: int, command: int) -> None:
         out = (ctypes.c_double * 2).from_address(command)
         try:
-            out[0], out[1] = law.function((x, y, theta), _tuple_at(limits, Limits), _tuple_at(gains, Gains))
+            found = law.function((x, y, theta), _tuple_at(limits, Limits), _tuple_at(gains, Gains))
+            out[0], out[1] = _finite(law.name, found)
         except BaseException as error:  # a C function cannot raise; raise_errors does
             law.errors.append(error)
             out[0] = out[1] = 0.0
 
     return _C_LAW(call)
+
+
+def _finite(name: str, command: Any) -> tuple[float, float]:
+    v, omega = (float(number) for number in command)
+    if not (math.isfinite(v) and math.isfinite(omega)):
+        raise ArithmeticError(f"law {name!r} gave no finite command but {command}")
+    return v, omega
 
 
 def _tuple_at(address: int, kind: Any) -> Any:

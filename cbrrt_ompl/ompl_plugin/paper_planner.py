@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from cbrrt_ompl.motion.laws import raise_errors
 from cbrrt_ompl.ompl_plugin.binding import oc
 from cbrrt_ompl.ompl_plugin.own_sampler import OwnSampler
 from cbrrt_ompl.ompl_plugin.samplers import (
@@ -67,7 +68,9 @@ class PaperPlanner(OwnSampler, oc.RRT):  # type: ignore[misc]  # OMPL has no typ
         self._query, self._goal = query, problem.getGoal()
         if self.sampler is not None:
             self.sampler.aim_at(self._goal)
-        return super().solve(*condition)
+        status = super().solve(*condition)
+        raise_errors()
+        return status
 
     def clear(self) -> None:
         """Forget the tree."""
