@@ -125,7 +125,7 @@ class TestGoalRegion:
         regions[0] = (0.0, 0.0, 0.5, 0.0, math.inf, math.inf)
         region = record_of(regions)
         for radius, is_inside in ((0.5, False), (math.nextafter(0.5, 0.0), True)):
-            assert in_goal(region, radius * direction[0], radius * direction[1], 3.0, 1.0, 1.0) is is_inside
+            assert in_goal(region, radius * direction[0], radius * direction[1], 3.0, 1.0, 1.0) == is_inside
 
     def test_the_rim_is_the_same_to_the_last_bit(self) -> None:
         rng = np.random.default_rng(0)
