@@ -17,16 +17,21 @@ import pytest
 from cbrrt_ompl import Scenario, make_setup, make_state_space, plan, write_state
 from cbrrt_ompl.collision.fcl_referee import FclReferee
 from cbrrt_ompl.collision.world import World
-from cbrrt_ompl.ompl_plugin import native_layout, native_space, self_check
-from cbrrt_ompl.ompl_plugin.binding import ob, oc, ou
-from cbrrt_ompl.ompl_plugin.compiled_methods import VARIABLE, compiled_methods_work, use_compiled_methods
-from cbrrt_ompl.ompl_plugin.native_layout import LayoutError, object_address, vtable_address, words_at
-from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
-from cbrrt_ompl.ompl_plugin.validity import FclStateValidityChecker
+from cbrrt_ompl.ompl_plugin.availability import has_ompl
 from cbrrt_ompl.planners.registry import PLANNERS, Backend
 from cbrrt_ompl.problem.obstacles import Bounds, Box
 from cbrrt_ompl.problem.robot import Footprint, Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
+
+if has_ompl():
+    from cbrrt_ompl.ompl_plugin import native_layout, native_space, self_check
+    from cbrrt_ompl.ompl_plugin.binding import ob, oc, ou
+    from cbrrt_ompl.ompl_plugin.compiled_methods import VARIABLE, compiled_methods_work, use_compiled_methods
+    from cbrrt_ompl.ompl_plugin.native_layout import LayoutError, object_address, vtable_address, words_at
+    from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
+    from cbrrt_ompl.ompl_plugin.validity import FclStateValidityChecker
+else:
+    pytest.skip("all of it needs OMPL", allow_module_level=True)
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the wheel hides the symbols")
 
@@ -267,7 +272,6 @@ def test_ctrl_c_ends_a_solve_at_once(planner: str) -> None:
 import os, signal, threading, time
 from dataclasses import replace
 import cbrrt_ompl
-from cbrrt_ompl.ompl_plugin.binding import ou
 ou.setLogLevel(ou.LOG_NONE)
 scenario = cbrrt_ompl.load_scenario("paper_case1")
 scenario = replace(scenario, goal=cbrrt_ompl.Goal(4.9, -4.9, tolerance=1e-9))

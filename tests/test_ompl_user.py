@@ -28,12 +28,17 @@ from cbrrt_ompl import (
 )
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import SettingsError, TrajectoryError
-from cbrrt_ompl.ompl_plugin.binding import ob, oc, ou
+from cbrrt_ompl.ompl_plugin.availability import has_ompl
 from cbrrt_ompl.planners.registry import PLANNERS, Backend
 from cbrrt_ompl.problem.obstacles import Bounds, Box
 from cbrrt_ompl.problem.robot import Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.scenario.scenario import Scenario
+
+if has_ompl():
+    from cbrrt_ompl.ompl_plugin.binding import ob, oc, ou
+else:
+    pytest.skip("all of it needs OMPL", allow_module_level=True)
 
 OPEN = Scenario(name="open", world=World(Bounds((-5.0, -5.0), (5.0, 5.0))), start=State(-4.0, 0.0), goal=Goal(4.0, 0.0))
 OURS = [name for name, planner in PLANNERS.items() if planner.backend is not Backend.OMPL]

@@ -72,6 +72,7 @@ sys.exit(7)"""
     assert done.returncode == 7, done.stderr
 
 
+@pytest.mark.needs_ompl
 @pytest.mark.parametrize("module", ["util", "base", "control", "geometric", "tools"])
 @pytest.mark.parametrize("first", ["import cbrrt_ompl", "import ompl\nimport cbrrt_ompl", ""])
 def test_ompl_may_be_imported_before_the_first_plan_and_before_the_package(first: str, module: str) -> None:
@@ -92,6 +93,7 @@ sys.exit(5)"""
         assert "import cbrrt_ompl before OMPL's modules" in done.stderr
 
 
+@pytest.mark.needs_ompl
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the wheel is loaded as it is")
 def test_one_libompl_is_loaded_where_the_package_comes_first() -> None:
     code = """import cbrrt_ompl

@@ -185,6 +185,9 @@ class Drive:
             search_limit = math.inf
             planning = replace(planning, max_samples=portions * settings.max_samples)
         record = partial(Replan, looked_at, start, looked_at + limit)
+        if planning.clearance > 0.0:  # from where the robot is nearer to something, it must not get nearer still
+            here = knowledge.world.clearance(self._robot.footprint, start[:3])
+            planning = replace(planning, clearance=min(planning.clearance, here))
         try:
             scenario = replace(self.scenario, world=knowledge.world, robot=self._robot, start=start, planning=planning)
         except ScenarioError:

@@ -118,7 +118,7 @@ class Follower:
             v and omega [m/s, rad/s]; after the end of the trajectory the robot is braked.
         """
         if self.is_done:
-            wanted = np.zeros(2)
+            wanted: NDArray[np.float64] = np.zeros(2)
         else:
             end = float(self.trajectory.t[-1])
             reference, ahead = self.trajectory.at([self.time, min(self.time + self.step, end)])
@@ -256,7 +256,7 @@ def follow(
     references = follower.trajectory.at(times)[:, :3]
     errors = np.array([error_of(state[:3], reference) for state, reference in zip(states, references, strict=True)])
     return FollowResult(
-        t=times[0] + follower.step * np.arange(float(len(states))),
+        t=times[0] + follower.step * np.arange(len(states), dtype=np.float64),
         states=np.array(states),
         commands=np.array(commands).reshape(-1, 2),
         times=np.array(times),

@@ -85,7 +85,8 @@ def _largest_discs(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Centres, shape (n, 2), and radii, shape (n,), of the largest discs inside that touch the outline at points."""
     x_min, y_min, x_max, y_max = polygon.bounds
-    low, high = np.zeros(len(points)), np.full(len(points), max(x_max - x_min, y_max - y_min))
+    low: NDArray[np.float64] = np.zeros(len(points))
+    high: NDArray[np.float64] = np.full(len(points), max(x_max - x_min, y_max - y_min))
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         centres = shapely.points(points + middle[:, None] * inward)

@@ -62,7 +62,8 @@ def solve_and_repair(
         A trajectory that is free, within all limits and in the goal region; None where the guess leads to none.
     """
     scenario, n = transcription.scenario, len(guess.controls)
-    margins, caps = np.full(n + 1, transcription.margin), np.ones(n + 1)
+    margins: NDArray[np.float64] = np.full(n + 1, transcription.margin)
+    caps = np.ones(n + 1)
     barrier, spent = WARM_BARRIER if is_warm else FIRST_BARRIER, 0
     for _ in range(ROUNDS):
         solution = transcription.solve(

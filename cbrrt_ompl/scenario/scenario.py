@@ -168,7 +168,8 @@ def find_problems(parts: Mapping[str, Any]) -> list[Problem]:
     if robot is not None and world is not None:
         found += _footprint_problems(robot, world)
     if start is not None:
-        found += _start_problems(start, world, robot, parts.get("map"))
+        clearance = 0.0 if planning is None else planning.clearance
+        found += _start_problems(start, world, robot, parts.get("map"), clearance)
     if goal is not None and world is not None:
         found += _goal_problems(goal, world, robot, parts.get("map"))
     if planning is not None:
@@ -229,7 +230,7 @@ def _footprint_problems(robot: Robot, world: World) -> Iterator[Problem]:
 
 
 def _start_problems(
-    start: State, world: World | None, robot: Robot | None, source: MapSource | None
+    start: State, world: World | None, robot: Robot | None, source: MapSource | None, clearance: float
 ) -> Iterator[Problem]:
     """Why the robot cannot start from a state."""
     infinite = [name for name, value in start._asdict().items() if not is_number(value, LARGEST)]
@@ -246,6 +247,11 @@ def _start_problems(
         reason = why_not(world, robot.footprint, start[:3], source)
         expected = f"a pose where the footprint touches no obstacle and no bound: {reason}"
         yield Problem("start", list(start[:3]), expected)
+    elif robot is not None and clearance > 0.0:
+        found = world.clearance(robot.footprint, start[:3])
+        if found < clearance:
+            expected = f"a pose {clearance:g} m from everything (planning.clearance); it is {found:.4g} m"
+            yield Problem("start", list(start[:3]), expected)
 
 
 def _inside(world: World) -> str:

@@ -197,7 +197,7 @@ def _dynobench(data: Mapping[str, Any]) -> Track:
         expected = "rows [x, y, theta] or [x, y, theta, v, omega]: a result of dynobench"
         raise TrajectoryError(Problem("states", MISSING if states is None else states, expected))
     rows = np.array(states, dtype=float)
-    return Track(_dynobench_step(data, len(rows)) * np.arange(float(len(rows))), *rows.T)
+    return Track(_dynobench_step(data, len(rows)) * np.arange(len(rows), dtype=np.float64), *rows.T)
 
 
 def _is_state(state: object, width: int) -> bool:

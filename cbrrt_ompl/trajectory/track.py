@@ -80,7 +80,7 @@ class Track:
             poses: rows of (x, y, theta), shape (n, 3) [m, m, rad].
         """
         array = np.asarray(poses, dtype=float).reshape(-1, 3)
-        return cls(np.arange(float(len(array))), *array.T, is_timed=False)
+        return cls(np.arange(len(array), dtype=np.float64), *array.T, is_timed=False)
 
     @property
     def duration(self) -> float:
