@@ -301,7 +301,7 @@ def test_no_planner_runs_with_the_sampler_or_the_model_of_another(
         return sample(self, *arguments)
 
     def noting_propagate(self: Any, *arguments: Any) -> None:
-        laws[experiment._active.getName()].add(int(self.model[0]))
+        laws[experiment._active.getName()].add(int(self.model["law"][0]))
         propagate(self, *arguments)
 
     monkeypatch.setattr(ExtensionSampler, "sampleTo", counting_sample)
@@ -319,7 +319,8 @@ def test_no_planner_runs_with_the_sampler_or_the_model_of_another(
 @pytest.mark.slow
 def test_every_run_repeats_the_plan_with_its_seed(field: Scenario) -> None:
     seeds = (5, 3)
-    names = [name for name in PLANNERS if name != "syclop-est"]  # a second to set up, and as syclop-rrt
+    left_out = {"syclop-est", "cb-rrt-anytime"}  # a second to set up, and as syclop-rrt; in OMPL it ends when solved
+    names = [name for name in PLANNERS if name not in left_out]
     log = Experiment(field, {name: seeds for name in names}, "open").run(10.0)
     for name, runs in cells(log).items():
         for seed, run in zip(seeds, runs, strict=True):

@@ -28,7 +28,7 @@ def scenario(footprint: Footprint, clearance: float = CLEARANCE) -> Scenario:
 
 
 @pytest.mark.parametrize("footprint", [Footprint.point(), Footprint.disc(0.2), RECTANGLE], ids=["point", "disc", "box"])
-@pytest.mark.parametrize("planner", ["cb-rrt-compiled", "s-rrt-compiled", "cb-rrt-robust"])
+@pytest.mark.parametrize("planner", ["cb-rrt", "cb-rrt-compiled", "cb-rrt-robust"])
 def test_every_pose_of_a_plan_keeps_the_clearance(planner: str, footprint: Footprint) -> None:
     problem = scenario(footprint)
     for seed in range(4):

@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
     limits = {"improve_for": arguments.improve_for, "max_iterations": arguments.max_iterations}
     warm_up(planner, improves=any(limit is not None for limit in limits.values()))
     with plan_progress(scenario.planning.max_samples, planner) as progress:
-        result = plan(scenario, planner, arguments.seed, arguments.time_limit, progress, **limits)
+        result = plan(scenario, planner, arguments.seed, arguments.time_limit, progress=progress, **limits)
     trajectory = result.trajectory
     if arguments.trajectory is not None and trajectory is not None:
         trajectory.save(arguments.trajectory)

@@ -17,6 +17,9 @@ OUTLINE_POINTS = 160
 GAP = 0.08
 """How far a point of the outline may lie outside of all discs, as a fraction of the radius of the largest one."""
 
+LEAST_GAP = 1e-3
+"""The gap of a footprint in which hardly a disc fits, as a fraction of its size."""
+
 _HALVINGS = 30
 
 
@@ -46,7 +49,8 @@ def _cover_polygon(polygon: shapely.Polygon) -> NDArray[np.float64]:
     points, inward = _outline(polygon)
     candidates = np.column_stack(_largest_discs(polygon, points, inward))
     corners = _convex_corners(polygon)
-    gap, count = GAP * candidates[:, 2].max(), MOST_DISCS + 1
+    span = float(np.ptp(points, axis=0).max())
+    gap, count = max(GAP * float(candidates[:, 2].max()), LEAST_GAP * span), MOST_DISCS + 1
     while count > MOST_DISCS:
         discs = _greedy_cover(points, candidates, corners, gap)
         gap, count = 1.3 * gap, len(discs)
@@ -62,9 +66,15 @@ def _greedy_cover(
     covers = from_candidates <= gap  # (points, candidates)
     missing = np.hypot(*(points[:, None] - corners[None]).transpose(2, 0, 1)).min(axis=1) > gap
     while missing.any():
-        best = int(np.argmax(covers[missing].sum(axis=0)))
-        chosen.append(candidates[[best]])
-        missing &= ~covers[:, best]
+        covered = covers[missing].sum(axis=0)
+        best = int(np.argmax(covered))
+        if covered[best] > 0:
+            chosen.append(candidates[[best]])
+            missing &= ~covers[:, best]
+        else:  # a sliver: no disc fits into it, so its outline itself is covered
+            point = points[np.argmax(missing)]
+            chosen.append(np.array([[*point, 0.0]]))
+            missing &= np.hypot(*(points - point).T) > gap
     return np.concatenate(chosen)
 
 

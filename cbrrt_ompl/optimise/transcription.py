@@ -49,6 +49,9 @@ SHORTEST_STEP = 1e-3
 ITERATIONS_AT_ONCE = 16
 """Newton steps between two looks at the clock."""
 
+MOST_ROWS = 1000
+"""Rows of a trajectory for an interval at most, however short the planners' step is."""
+
 
 @dataclass
 class Solution:
@@ -128,7 +131,7 @@ class Transcription:
         Its rows are evenly spaced, at most an integration step apart.
         """
         limits, h = self.scenario.robot.limits, float(guess.states[0, STEP])
-        parts = max(1, math.ceil(h / self.scenario.planning.step - 1e-9))
+        parts = min(max(1, math.ceil(h / self.scenario.planning.step - 1e-9)), MOST_ROWS)
         begin = np.array(self.scenario.start, dtype=float)
         states = roll_out(begin, guess.controls, h / parts, parts, limits, self.is_kinematic)
         commands = np.concatenate([states[1:, 3:], states[-1:, 3:]])
