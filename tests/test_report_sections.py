@@ -140,5 +140,5 @@ def test_every_kind_of_index_that_is_timed_gives_the_same_distances(kind: str) -
     rng = np.random.default_rng(1)
     positions, queries = SIDE * rng.random((300, 2)), SIDE * rng.random((50, 2))
     distances = np.hypot(*(queries[:, None] - positions).transpose(2, 0, 1)).min(axis=1)  # (50,)
-    index, _stack = build_index(KINDS[kind], positions), np.empty((2 * 512 + 64, 3))
+    index = build_index(KINDS[kind], positions)
     assert answer(index, queries, len(positions)) == pytest.approx(distances.sum(), rel=1e-12)

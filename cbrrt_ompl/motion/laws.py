@@ -287,12 +287,19 @@ def _pointer(_: Any, address: Any) -> Any:
     return types.voidptr(types.int64), generate
 
 
+def _in_memory(builder: Any, record: Any) -> Any:
+    """Where a record stands; a named tuple of as many numbers is put where one can stand."""
+    if isinstance(record.type, ir.PointerType):
+        return record
+    return cgutils.alloca_once_value(builder, record)
+
+
 @_intrinsic
 def _call_law(_: Any, address: Any, x: Any, y: Any, theta: Any, limits: Any, gains: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         command = cgutils.alloca_once(builder, ir.ArrayType(_REAL, 2))
         kind = ir.FunctionType(ir.VoidType(), [_REAL] * 3 + [_ADDRESS] * 3)
-        records = [builder.ptrtoint(record, _ADDRESS) for record in (*args[4:6], command)]
+        records = [builder.ptrtoint(_in_memory(builder, record), _ADDRESS) for record in (*args[4:6], command)]
         builder.call(builder.inttoptr(args[0], kind.as_pointer()), [*args[1:4], *records])
         numbers = [builder.load(cgutils.gep_inbounds(builder, command, 0, i)) for i in range(2)]
         return context.make_tuple(builder, signature.return_type, numbers)
