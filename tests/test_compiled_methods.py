@@ -272,6 +272,7 @@ def test_ctrl_c_ends_a_solve_at_once(planner: str) -> None:
 import os, signal, threading, time
 from dataclasses import replace
 import cbrrt_ompl
+from cbrrt_ompl.ompl_plugin.binding import ou
 ou.setLogLevel(ou.LOG_NONE)
 scenario = cbrrt_ompl.load_scenario("paper_case1")
 scenario = replace(scenario, goal=cbrrt_ompl.Goal(4.9, -4.9, tolerance=1e-9))

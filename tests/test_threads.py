@@ -9,12 +9,13 @@ import sys
 import threading
 from collections.abc import Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from cbrrt_ompl import PlanResult, Scenario, load_scenario, plan, verify
+from cbrrt_ompl import Goal, PlanningSettings, PlanResult, Scenario, load_scenario, plan, verify
 from cbrrt_ompl.problem.robot import Footprint
 from cbrrt_ompl.scenario.scenario import scenario_from_dict
 
@@ -147,7 +148,8 @@ def test_a_plan_within_the_progress_of_another_does_not_wait_for_it(scenario: Sc
         if not inner:
             inner.append(plan_without_clock(scenario, "cb-rrt", 1))
 
-    plan(scenario, "pdst", 1, 1.0, progress=progress)
+    endless = replace(scenario, goal=Goal(3.0, 3.0, tolerance=1e-9), planning=PlanningSettings(max_samples=10**9))
+    plan(endless, "pdst", 1, 1.0, progress=progress)
     assert_same(inner[0], plan_without_clock(scenario, "cb-rrt", 1))
 
 
