@@ -31,9 +31,9 @@ test-latest:
 
 # Lines of compiled kernels are not seen: tests of the kernels run again without the compiler, but for those that would
 # take minutes then.
-KERNEL_TESTS := control_laws kernel_laws kinematics manoeuvres disc_tree motion_model motion_check extension nearest \
+KERNEL_TESTS := control_laws kernel_laws kinematics manoeuvres motion_model motion_check extension nearest \
 	replay wheels occupancy report_sections trajectory
-TOO_SLOW := thousand or millimetre or MapHolds or BrakeSafe or brake_safe_tree or position_alone or passes_through
+TOO_SLOW := thousand or millimetre or TestExtensions or BrakeSafe or brake_safe_tree or position_alone or passes_through
 coverage: $(VENV)/test.stamp
 	$(BIN)/coverage erase
 	$(BIN)/coverage run -m pytest -n 2

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from numbers import Integral
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -47,6 +47,8 @@ PATIENCE = 0.5
 PROGRESS_PERIOD = 0.1
 """Time between two reports of progress [s]."""
 
+T = TypeVar("T")
+
 Progress = Callable[[int, float], None]
 """Takes the samples so far and the time since the start [s]."""
 
@@ -63,8 +65,8 @@ class PlanResult:
     """``solved``, ``time limit``, ``sample limit``, or ``no way`` where that is proven."""
     trajectory: Trajectory | None
     """From the start into the goal region; None where not solved."""
-    nodes: int
-    """Nodes of the tree."""
+    count_nodes: Callable[[], int] = field(repr=False)
+    """Counts the nodes in the planner's memory."""
     samples: int
     """Samples drawn; for OMPL's own planners the rounds of their main loop."""
     planning_time: float
@@ -80,13 +82,19 @@ class PlanResult:
         return self.status == SOLVED
 
     @cached_property
+    def nodes(self) -> int:
+        """Nodes of the tree; counted when first asked for, since OMPL copies a tree to count it."""
+        return self.count_nodes()
+
+    @cached_property
     def tree(self) -> Tree:
         """All nodes and edges; made when first asked for."""
         return self.make_tree()
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is pickled: the tree itself instead of the planner's memory."""
-        return {**self.__dict__, "make_tree": partial(_given, self.tree)}
+        """What is pickled: the tree itself and its size instead of the planner's memory."""
+        kept = {"make_tree": partial(_given, self.tree), "count_nodes": partial(_given, self.nodes)}
+        return {**self.__dict__, **kept}
 
 
 def plan(
@@ -271,7 +279,7 @@ def _result_of(search: Search, planner: str, seed: int | None, watch: _Watch) ->
         seed=seed,
         status=SOLVED if search.has_reached_goal else watch.ended_by,
         trajectory=search.trajectory() if search.has_reached_goal else None,
-        nodes=search.nodes,
+        count_nodes=partial(_given, search.nodes),
         samples=search.samples,
         planning_time=planning_time,
         make_tree=search.tree,
@@ -288,7 +296,7 @@ def _plan_in_ompl(scenario: Scenario, planner: str, seed: int | None, watch: _Wa
         seed=seed,
         status=SOLVED if found.trajectory is not None else watch.ended_by,
         trajectory=found.trajectory,
-        nodes=found.nodes,
+        count_nodes=found.count_nodes,
         samples=found.samples,
         planning_time=found.planning_time,
         make_tree=found.make_tree,
@@ -327,11 +335,11 @@ def _already_there(scenario: Scenario, planner: str, seed: int | None) -> PlanRe
     start = np.array([scenario.start], dtype=float)
     stay = trajectory_from_controls(start[0], np.empty((0, 3)), np.empty(0, dtype=np.int64), model)
     tree = Tree(start, np.array([-1]), np.empty((0, 2)))
-    return PlanResult(planner, seed, SOLVED, stay, 1, 0, 0.0, lambda: tree)
+    return PlanResult(planner, seed, SOLVED, stay, partial(_given, 1), 0, 0.0, partial(_given, tree))
 
 
-def _given(tree: Tree) -> Tree:
-    return tree
+def _given(value: T) -> T:
+    return value
 
 
 class _Watch:

@@ -27,8 +27,8 @@ class Found(NamedTuple):
 
     trajectory: Trajectory | None
     """Into the goal region; None where it was not reached."""
-    nodes: int
-    """Nodes of the tree."""
+    count_nodes: Callable[[], int]
+    """Counts the nodes of the tree; OMPL copies it for that, so that it takes its time."""
     samples: int
     """Samples drawn, or rounds of the main loop of OMPL's own planners."""
     planning_time: float
@@ -78,15 +78,20 @@ def run(
         trajectory = None
         if setup.haveExactSolutionPath():
             trajectory = trajectory_from_path(setup.getSolutionPath(), scenario)
-        data = ob.PlannerData(si)
-        setup.getPlanner().getPlannerData(data)
     return Found(
         trajectory,
-        nodes=data.numVertices(),
+        count_nodes=lambda: count_nodes(setup.getPlanner(), si),
         samples=solver.samples if isinstance(solver, PaperPlanner) else rounds.count,
         planning_time=planning_time,
         make_tree=lambda: tree_from_planner(setup.getPlanner(), si, equipment.model),
     )
+
+
+def count_nodes(planner: Any, si: Any) -> int:
+    """Nodes that a planner of OMPL holds."""
+    data = ob.PlannerData(si)
+    planner.getPlannerData(data)
+    return int(data.numVertices())
 
 
 class _Rounds:

@@ -69,7 +69,7 @@ def _measure_one(scenario: Scenario, planner: str, seed: int) -> Run:
     """One run and its verification."""
     if planner == NAIVE:
         found = plan_naively(scenario, seed)
-        trajectory, figures = found.trajectory, (found.nodes, found.samples, found.planning_time)
+        trajectory, figures = found.trajectory, (found.count_nodes(), found.samples, found.planning_time)
     else:
         result = plan(scenario, planner, seed, TIME_LIMIT)
         trajectory, figures = result.trajectory, (result.nodes, result.samples, result.planning_time)
