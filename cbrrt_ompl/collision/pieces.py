@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -23,7 +23,6 @@ PIECE = np.dtype(
         ("kind", np.int32),
         ("first", np.int32),  # polygon: row of its first corner
         ("count", np.int32),  # polygon: how many corners it has
-        ("source", np.int32),  # which obstacle it is a part of
         ("x", np.float64),  # centre [m]
         ("y", np.float64),
         ("half_x", np.float64),  # rectangle: half sides; disc: its radius [m]
@@ -58,43 +57,36 @@ class Pieces(NamedTuple):
 
 
 def join(parts: Iterable[Pieces]) -> Pieces:
-    """Several sets of pieces as one; the obstacles are counted through."""
-    pieces, corners, first, sources = [], [], 0, 0
+    """Several sets of pieces as one."""
+    pieces, corners, first = [], [], 0
     for part in parts:
         moved = part.pieces.copy()
         moved["first"] += first
-        moved["source"] += sources
         pieces.append(moved)
         corners.append(part.corners)
         first += len(part.corners)
-        sources += int(part.pieces["source"].max(initial=-1)) + 1
     return Pieces(
         np.concatenate([np.empty(0, dtype=PIECE), *pieces]), np.concatenate([np.empty(0, dtype=CORNER), *corners])
     )
 
 
 def obstacle_pieces(obstacles: Sequence[Obstacle]) -> Pieces:
-    """The pieces of obstacles; each knows the number of its obstacle.
+    """The pieces of obstacles, kind after kind.
 
     Args:
         obstacles: boxes, discs and polygons.
     """
-    boxes = [(i, *o.min, *o.max) for i, o in enumerate(obstacles) if isinstance(o, Box)]
-    turned = [(i, *o.center, *o.size, o.angle) for i, o in enumerate(obstacles) if isinstance(o, OrientedBox)]
-    discs = [(i, *o.center, o.radius) for i, o in enumerate(obstacles) if isinstance(o, Disc)]
-    polygons = [(i, polygon_pieces(o)) for i, o in enumerate(obstacles) if isinstance(o, Polygon)]
-    source, x0, y0, x1, y1 = np.array(boxes, dtype=float).reshape(-1, 5).T
-    straight = _simple_pieces(RECTANGLE, source, 0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (x1 - x0), 0.5 * (y1 - y0))
-    source, x, y, width, height, angle = np.array(turned, dtype=float).reshape(-1, 6).T
-    tilted = _simple_pieces(RECTANGLE, source, x, y, 0.5 * width, 0.5 * height, angle)
-    source, x, y, radius = np.array(discs, dtype=float).reshape(-1, 4).T
-    round_ones = _simple_pieces(DISC, source, x, y, radius, radius)
-    with_corners = join(part for _, part in polygons)
-    with_corners.pieces["source"] = np.repeat([i for i, _ in polygons], [len(part.pieces) for _, part in polygons])
-    return Pieces(
-        np.concatenate([straight, tilted, round_ones, with_corners.pieces]),
-        with_corners.corners,
-    )
+    boxes = [(*o.min, *o.max) for o in obstacles if isinstance(o, Box)]
+    turned = [(*o.center, *o.size, o.angle) for o in obstacles if isinstance(o, OrientedBox)]
+    discs = [(*o.center, o.radius) for o in obstacles if isinstance(o, Disc)]
+    x0, y0, x1, y1 = np.array(boxes, dtype=float).reshape(-1, 4).T
+    straight = _simple_pieces(RECTANGLE, 0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (x1 - x0), 0.5 * (y1 - y0))
+    x, y, width, height, angle = np.array(turned, dtype=float).reshape(-1, 5).T
+    tilted = _simple_pieces(RECTANGLE, x, y, 0.5 * width, 0.5 * height, angle)
+    x, y, radius = np.array(discs, dtype=float).reshape(-1, 3).T
+    round_ones = _simple_pieces(DISC, x, y, radius, radius)
+    with_corners = join(polygon_pieces(o) for o in obstacles if isinstance(o, Polygon))
+    return with_corners._replace(pieces=np.concatenate([straight, tilted, round_ones, with_corners.pieces]))
 
 
 @lru_cache(maxsize=10_000)
@@ -111,11 +103,7 @@ def rectangle_pieces(centers: NDArray[np.float64], sizes: NDArray[np.float64], a
         sizes: shape (n, 2) [m].
         angle: direction of the first side [rad]; 0 lies exactly along the axes.
     """
-    x, y = centers.T
-    half_x, half_y = 0.5 * sizes.T
-    angles = np.full(len(centers), angle)
-    pieces = _simple_pieces(RECTANGLE, np.arange(len(centers)), x, y, half_x, half_y, angles)
-    return Pieces(pieces, np.empty(0, dtype=CORNER))
+    return Pieces(_simple_pieces(RECTANGLE, *centers.T, *(0.5 * sizes.T), angle), np.empty(0, dtype=CORNER))
 
 
 def footprint_pieces(footprint: Footprint, center: tuple[float, float]) -> Pieces:
@@ -147,7 +135,6 @@ def corner_records(ring: NDArray[np.float64]) -> Records:
 
 def _simple_pieces(
     kind: int,
-    source: NDArray[Any],
     x: NDArray[np.float64],
     y: NDArray[np.float64],
     half_x: NDArray[np.float64],
@@ -156,6 +143,6 @@ def _simple_pieces(
 ) -> Records:
     """Rectangles or discs, one a row of the arrays, each of shape (n,)."""
     pieces = np.zeros(len(x), dtype=PIECE)
-    pieces["kind"], pieces["source"], pieces["x"], pieces["y"] = kind, source, x, y
+    pieces["kind"], pieces["x"], pieces["y"] = kind, x, y
     pieces["half_x"], pieces["half_y"], pieces["cos"], pieces["sin"] = half_x, half_y, np.cos(angle), np.sin(angle)
     return pieces

@@ -198,7 +198,7 @@ class World:
 
     @cached_property
     def pieces(self) -> Pieces:
-        """The obstacles as convex pieces, in the same order where there are no polygons."""
+        """The obstacles as convex pieces."""
         loose = obstacle_pieces(tuple(dict.fromkeys(self._loose)))
         return loose if self.layer is None else join((self.layer.pieces, loose))
 

@@ -111,11 +111,6 @@ def motion_room(clearance: float) -> float:
     return ROOM if clearance <= ROOM - CLEARANCE_DIP else clearance + CLEARANCE_DIP
 
 
-def control_dimension(model: Records) -> int:
-    """Numbers of OMPL's controls under a model: (v, omega), a reference pose, or room for a manoeuvre's mark."""
-    return 3 if model["law"][0] == CLOSED_LOOP or model["approaches"][0] else 2
-
-
 def check_step(robot: Robot, planning: PlanningSettings) -> None:
     """Refuse a step that is too long for the integrator.
 
@@ -235,13 +230,3 @@ def manoeuvre_command(
 def manoeuvre_has_ended(manoeuvre: float, state: tuple[float, float, float, float, float], goal: Record) -> bool:
     """Whether a manoeuvre is over, see :func:`cbrrt_ompl.motion.manoeuvres.has_ended`."""
     return has_ended(manoeuvre, state, (goal.x, goal.y, goal.theta), goal.heading_tolerance < math.inf)
-
-
-@njit(cache=True)
-def has_come_to_end(
-    state: tuple[float, float, float, float, float], control: tuple[float, float, float], model: Record
-) -> bool:
-    """Whether a roll-out ends at a state before its last step: in the goal region, or with its manoeuvre."""
-    if is_manoeuvre(control):
-        return manoeuvre_has_ended(control[2], state, model.goal)
-    return in_goal(model.goal, state[0], state[1], state[2], state[3], state[4])

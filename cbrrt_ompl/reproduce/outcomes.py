@@ -114,10 +114,6 @@ class Outcomes:
         """A sample, if there is one."""
         return self._samples.get(Key(scene, variant, planner))
 
-    def having(self, planner: str) -> list[Sample]:
-        """All samples of a planner."""
-        return [sample for key, sample in self._samples.items() if key.planner == planner]
-
     def variants(self, scene: str) -> list[str]:
         """The variants of a scene, without the scene as it is."""
         return list(dict.fromkeys(key.variant for key in self._samples if key.scene == scene and key.variant))
