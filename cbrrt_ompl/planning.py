@@ -15,7 +15,7 @@ import numpy as np
 from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.collision.free_poses import nearest_free_pose
 from cbrrt_ompl.errors import Problem, SettingsError
-from cbrrt_ompl.motion.model import STEERING, check_step, make_model
+from cbrrt_ompl.motion.model import ROOM, STEERING, check_step, make_model
 from cbrrt_ompl.ompl_plugin.availability import check_ompl, has_ompl
 from cbrrt_ompl.optimise.anytime import further_guesses, robust_search
 from cbrrt_ompl.optimise.improving import Found, Improver, check_improvement, geodesic_guesses
@@ -308,7 +308,7 @@ def approachable_goal(scenario: Scenario) -> Goal:
 
     Every state in it is in the goal region of the scenario.
     """
-    goal, robot, room = scenario.goal, scenario.robot, max(scenario.planning.clearance, 5e-4) + 1e-3
+    goal, robot, room = scenario.goal, scenario.robot, max(scenario.planning.clearance, ROOM) + 1e-3
     centre = (goal.x, goal.y, 0.0 if goal.theta is None else goal.theta)
     if scenario.world.clearance(robot.footprint, centre) > room:
         return goal

@@ -232,6 +232,8 @@ def bounding_box(obstacle: Obstacle) -> tuple[float, float, float, float]:
     if isinstance(obstacle, Disc):
         (x, y), r = obstacle.center, obstacle.radius
         return x - r, y - r, x + r, y + r
+    if isinstance(obstacle, Box):
+        return *obstacle.min, *obstacle.max
     x_min, y_min, x_max, y_max = obstacle.to_shapely().bounds
     return x_min, y_min, x_max, y_max
 

@@ -13,7 +13,7 @@ from cbrrt_ompl.collision.free_poses import nearest_free_pose
 from cbrrt_ompl.collision.occupancy import UNKNOWN
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import InputError
-from cbrrt_ompl.problem.obstacles import Box, Disc, Obstacle
+from cbrrt_ompl.problem.obstacles import Obstacle, bounding_box
 from cbrrt_ompl.problem.robot import Footprint
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def nearest_thing(world: World, footprint: Footprint, pose: Sequence[float], kno
     found, name = min(a0 - x0, b0 - y0, x1 - a1, y1 - b1), "the bounds"
     for i, obstacle in enumerate(world.obstacles):
         if _meets(obstacle, a0 - found, b0 - found, a1 + found, b1 + found):
-            distance = float(shapely.distance(area, _shape(obstacle)))
+            distance = float(shapely.distance(area, obstacle.to_shapely()))
             if distance < found:
                 number = f"obstacles[{i}]" if i < known else f"hidden obstacle {i - known}"
                 found, name = distance, f"{number}, a {type(obstacle).__name__.lower()}"
@@ -83,7 +83,7 @@ def _what_is_there(world: World, area: Any, source: MapSource | None) -> str:
         return unknown
     name, deepest = "", -1.0
     for index in touched:
-        depth = _depth(area, _shape(world.obstacles[index]))
+        depth = _depth(area, world.obstacles[index].to_shapely())
         if depth > deepest:
             place = world.obstacles[index]
             kind = type(place).__name__.lower() if index >= from_map else cells
@@ -103,28 +103,13 @@ def _touched(world: World, area: Any) -> list[int]:
     """Which obstacles meet an area."""
     x0, y0, x1, y1 = area.bounds
     near = [i for i, o in enumerate(world.obstacles) if _meets(o, x0, y0, x1, y1)]
-    return [i for i in near if shapely.distance(_shape(world.obstacles[i]), area) <= 1e-6]
+    return [i for i in near if shapely.distance(world.obstacles[i].to_shapely(), area) <= 1e-6]
 
 
 def _meets(obstacle: Obstacle, x0: float, y0: float, x1: float, y1: float) -> bool:
     """Whether the rectangle around an obstacle meets another one."""
-    if isinstance(obstacle, Box):
-        (a0, b0), (a1, b1) = obstacle.min, obstacle.max
-    elif isinstance(obstacle, Disc):
-        (x, y), r = obstacle.center, obstacle.radius
-        a0, b0, a1, b1 = x - r, y - r, x + r, y + r
-    else:
-        (a0, b0), (a1, b1) = obstacle.vertices.min(axis=0), obstacle.vertices.max(axis=0)
+    a0, b0, a1, b1 = bounding_box(obstacle)
     return bool(a0 <= x1 + 1e-6 and a1 >= x0 - 1e-6 and b0 <= y1 + 1e-6 and b1 >= y0 - 1e-6)
-
-
-def _shape(obstacle: Obstacle) -> Any:
-    """An obstacle as a shapely polygon."""
-    if isinstance(obstacle, Disc):
-        return shapely.Point(obstacle.center).buffer(obstacle.radius, quad_segs=_SEGMENTS // 4)
-    if isinstance(obstacle, Box):
-        return shapely.box(*obstacle.min, *obstacle.max)
-    return obstacle.to_shapely()
 
 
 def _depth(area: Any, solid: Any) -> float:
