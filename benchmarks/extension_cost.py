@@ -17,10 +17,9 @@ from pathlib import Path
 import numpy as np
 
 from cbrrt_ompl import Bounds, Disc, Goal, Scenario, State, World, load_scenario
-from cbrrt_ompl.motion.model import make_model
 from cbrrt_ompl.ompl_plugin.run import run
 from cbrrt_ompl.planners.registry import is_compiled, law_of
-from cbrrt_ompl.planners.search import Search
+from cbrrt_ompl.planners.search import search_in
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 OUT_OF_REACH = Goal(0.0, 0.0, tolerance=1e-12)
@@ -70,14 +69,10 @@ def cost_in_plugin(scenario: Scenario, planner: str, size: int, seed: int) -> fl
 
 def cost_in_loop(scenario: Scenario, planner: str, size: int, seed: int) -> float:
     """Seconds per attempt in the compiled loop."""
-    model = make_model(law_of(planner, scenario.planning), scenario.robot, scenario.goal, scenario.planning)
     elapsed, attempts = 0.0, 0
     started = time.perf_counter()
     for repetition in range(max(1, 3000 // size)):
-        search = Search(
-            model, scenario.world, scenario.robot.footprint, [scenario.start], 1000 * seed + repetition,
-            neighbours=scenario.planning.nearest_neighbour,
-        )  # fmt: skip
+        search = search_in(scenario, law_of(planner, scenario.planning), 1000 * seed + repetition, goal_bias=0.0)
         portion = max(50, size // 50)
         while search.nodes < size:
             is_counted = size <= 300 or search.nodes >= size // 2

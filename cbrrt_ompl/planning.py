@@ -22,7 +22,7 @@ from cbrrt_ompl.optimise.improving import Found, Improver, check_improvement, ge
 from cbrrt_ompl.optimise.improving import warm_up as warm_up_improvement
 from cbrrt_ompl.optimise.objective import Objective
 from cbrrt_ompl.planners.registry import PLANNERS, is_compiled, law_of, planner_named
-from cbrrt_ompl.planners.search import Search
+from cbrrt_ompl.planners.search import Search, search_in
 from cbrrt_ompl.planners.warm_up import warm_up
 from cbrrt_ompl.problem.robot import Footprint
 from cbrrt_ompl.problem.settings import Goal
@@ -255,19 +255,10 @@ def _check_arguments(seed: object, time_limit: object, progress: object) -> None
 
 def _plan_compiled(scenario: Scenario, planner: str, seed: int | None, watch: _Watch) -> PlanResult:
     """Plan with the compiled loop, without OMPL."""
-    planning = scenario.planning
-    search = Search(
-        make_model(law_of(planner, planning), scenario.robot, scenario.goal, planning),
-        scenario.world,
-        scenario.robot.footprint,
-        [scenario.start],
-        seed,
-        goal_bias=planning.goal_bias,
-        neighbours=planning.nearest_neighbour,
-        robust=PLANNERS[planner].is_robust,
-    )
+    row = PLANNERS[planner]
+    search = search_in(scenario, row.law(scenario.planning), seed, robust=row.is_robust)
     watch.start()
-    search.run(watch.should_stop, planning.max_samples)
+    search.run(watch.should_stop, scenario.planning.max_samples)
     return _result_of(search, planner, seed, watch)
 
 

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 
 from cbrrt_ompl import load_scenario, make_setup, plan, verify
 from cbrrt_ompl.collision.world import World
-from cbrrt_ompl.motion.model import make_model
 from cbrrt_ompl.ompl_plugin.availability import has_ompl
 from cbrrt_ompl.planners.registry import law_of
-from cbrrt_ompl.planners.search import Search
+from cbrrt_ompl.planners.search import Search, search_in
 from cbrrt_ompl.problem.obstacles import Bounds, Box
 from cbrrt_ompl.problem.robot import Limits, Robot
 from cbrrt_ompl.problem.settings import NEAREST_NEIGHBOUR, Goal, PlanningSettings, State
@@ -49,12 +48,7 @@ OPEN = Scenario(
 
 def make_search(scenario: Scenario, planner: str = "cb-rrt-compiled", seed: int = 1) -> Search:
     """A search before its first sample."""
-    planning = scenario.planning
-    model = make_model(law_of(planner, planning), scenario.robot, scenario.goal, planning)
-    return Search(
-        model, scenario.world, scenario.robot.footprint, [scenario.start], seed,
-        goal_bias=planning.goal_bias, neighbours=planning.nearest_neighbour,
-    )  # fmt: skip
+    return search_in(scenario, law_of(planner, scenario.planning), seed)
 
 
 def grow(scenario: Scenario, planner: str, seed: int, samples: int) -> Search:

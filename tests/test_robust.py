@@ -23,11 +23,10 @@ from cbrrt_ompl import (
     plan,
     verify,
 )
-from cbrrt_ompl.motion.model import make_model
 from cbrrt_ompl.ompl_plugin.availability import has_ompl
 from cbrrt_ompl.planners.growth import tolerated_failures
 from cbrrt_ompl.planners.registry import law_of
-from cbrrt_ompl.planners.search import Search
+from cbrrt_ompl.planners.search import Search, search_in
 from cbrrt_ompl.problem.settings import NEAREST_NEIGHBOUR
 
 if has_ompl():
@@ -36,15 +35,10 @@ if has_ompl():
 ROBUST = "cb-rrt-robust"
 
 
-def search_in(scenario: Scenario, seed: int) -> Search:
+def ended_search(scenario: Scenario, seed: int) -> Search:
     """A search that has ended."""
-    planning = scenario.planning
-    model = make_model(law_of("cb-rrt", planning), scenario.robot, scenario.goal, planning)
-    search = Search(
-        model, scenario.world, scenario.robot.footprint, [scenario.start], seed,
-        goal_bias=planning.goal_bias, neighbours=planning.nearest_neighbour, robust=True,
-    )  # fmt: skip
-    search.run(lambda _: False, planning.max_samples)
+    search = search_in(scenario, law_of("cb-rrt", scenario.planning), seed, robust=True)
+    search.run(lambda _: False, scenario.planning.max_samples)
     return search
 
 
@@ -74,7 +68,7 @@ def test_a_draw_of_zero_passes_nothing_over() -> None:
 
 def test_every_failed_extension_is_counted_at_a_place(blind_alley: Scenario) -> None:
     world = replace(blind_alley, goal=Goal(4.0, 0.0, tolerance=1e-9), planning=PlanningSettings(max_samples=3000))
-    search = search_in(world, 1)
+    search = ended_search(world, 1)
     is_place = search._tree["place"][: search.nodes] == np.arange(search.nodes)
     failed = search.samples - (search.nodes - 1)
     assert failed == search.refusals + search.collisions

@@ -14,7 +14,7 @@ from cbrrt_ompl.ompl_plugin.space import bounds_of, read_state, write_state
 from cbrrt_ompl.planners.extension import EXTENDED, NO_CHILD, REFUSED, UNTRIED
 from cbrrt_ompl.planners.growth import add_node, one_of_twins, tolerated_failures
 from cbrrt_ompl.planners.nearest import nearest
-from cbrrt_ompl.planners.search import DRAWS_AT_ONCE, Search
+from cbrrt_ompl.planners.search import Search
 from cbrrt_ompl.problem.settings import State
 from cbrrt_ompl.scenario.scenario import Scenario
 
@@ -54,9 +54,7 @@ class AskedSearch(Search):
             if self.nodes == len(self._tree):
                 self._make_room()
             if search["drawn"][0] == len(self._draws):
-                rows, columns = self._draws.shape
-                self._draws = self._rng.random((min(max(2 * rows, 256), DRAWS_AT_ONCE), columns))
-                search["drawn"] = 0
+                self._draw_more()
             draw = self._draws[search["drawn"][0]].tolist()
             search["drawn"] += 1
             search["samples"] += 1

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cbrrt_ompl.motion.kinematics import wrap_angle
-from cbrrt_ompl.motion.model import CLOSED_LOOP, make_model
+from cbrrt_ompl.motion.model import CLOSED_LOOP
 from cbrrt_ompl.optimise.guess import Guess, guess_from_trajectory
 from cbrrt_ompl.optimise.guesses import AHEAD, BACKWARDS, geodesic, guess_along
-from cbrrt_ompl.planners.search import Search
+from cbrrt_ompl.planners.search import Search, search_in
 from cbrrt_ompl.problem.robot import Footprint
 from cbrrt_ompl.scenario.scenario import Scenario
 from cbrrt_ompl.trajectory.trajectory import Trajectory
@@ -30,17 +30,8 @@ ROUNDS = 4
 
 def robust_search(scenario: Scenario, seed: int) -> Search:
     """A search by CB-RRT as it suits real maps: robust, the law evaluated at every step, with a goal bias."""
-    planning, robot = scenario.planning, scenario.robot
-    return Search(
-        make_model(CLOSED_LOOP, robot, scenario.goal, planning),
-        scenario.world,
-        robot.footprint,
-        [scenario.start],
-        seed,
-        goal_bias=planning.goal_bias or GOAL_BIAS,
-        neighbours=planning.nearest_neighbour,
-        robust=True,
-    )
+    goal_bias = scenario.planning.goal_bias or GOAL_BIAS
+    return search_in(scenario, CLOSED_LOOP, seed, goal_bias=goal_bias, robust=True)
 
 
 def further_guesses(scenario: Scenario, seed: int, has_ended: Callable[[], bool]) -> Iterator[Guess]:

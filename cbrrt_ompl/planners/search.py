@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.motion.laws import raise_errors
+from cbrrt_ompl.motion.model import make_model
 from cbrrt_ompl.motion.records import Records, record_array
 from cbrrt_ompl.planners.growth import (
     DRAWS,
@@ -26,6 +27,7 @@ from cbrrt_ompl.planners.nearest import KINDS, enlarged, make_index
 from cbrrt_ompl.planners.roll_out import STEPS
 from cbrrt_ompl.problem.robot import Footprint
 from cbrrt_ompl.problem.settings import State
+from cbrrt_ompl.scenario.scenario import Scenario
 from cbrrt_ompl.trajectory.replay import trajectory_from_controls, tree_from_controls
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.trajectory.tree import Tree
@@ -120,15 +122,19 @@ class Search:
                 self._steps,
             )
             if status == GROW_WANTS_DRAWS:
-                rows, columns = self._draws.shape
-                self._draws = self._rng.random((min(max(2 * rows, 256), DRAWS_AT_ONCE), columns))
-                self._search["drawn"] = 0
+                self._draw_more()
             elif status == GROW_WANTS_ROOM:
                 self._make_room()
             else:
                 raise_errors()
                 self.has_reached_goal = status == GROW_REACHED
                 return
+
+    def _draw_more(self) -> None:
+        """Draw the next random numbers, more at once each time."""
+        rows, columns = self._draws.shape
+        self._draws = self._rng.random((min(max(2 * rows, 256), DRAWS_AT_ONCE), columns))
+        self._search["drawn"] = 0
 
     def _make_room(self) -> None:
         """Double the arrays."""
@@ -185,3 +191,28 @@ class Search:
     def tree(self) -> Tree:
         """All nodes, with the way along every edge."""
         return tree_from_controls(*self.edges(), self.model)
+
+
+def search_in(
+    scenario: Scenario, law: int, seed: int | None = None, *, goal_bias: float | None = None, robust: bool = False
+) -> Search:
+    """A search through a scenario, before its first sample.
+
+    Args:
+        scenario: world, robot, start, goal and settings.
+        law: how the robot is driven, see :func:`cbrrt_ompl.motion.model.make_model`.
+        seed: see :class:`Search`.
+        goal_bias: see :class:`Search`; that of the scenario if not given.
+        robust: see :class:`Search`.
+    """
+    planning, robot = scenario.planning, scenario.robot
+    return Search(
+        make_model(law, robot, scenario.goal, planning),
+        scenario.world,
+        robot.footprint,
+        [scenario.start],
+        seed,
+        goal_bias=planning.goal_bias if goal_bias is None else goal_bias,
+        neighbours=planning.nearest_neighbour,
+        robust=robust,
+    )
