@@ -103,7 +103,8 @@ def rectangle_pieces(centers: NDArray[np.float64], sizes: NDArray[np.float64], a
         sizes: shape (n, 2) [m].
         angle: direction of the first side [rad]; 0 lies exactly along the axes.
     """
-    return Pieces(_simple_pieces(RECTANGLE, *centers.T, *(0.5 * sizes.T), angle), np.empty(0, dtype=CORNER))
+    (x, y), (half_x, half_y) = centers.T, 0.5 * sizes.T
+    return Pieces(_simple_pieces(RECTANGLE, x, y, half_x, half_y, angle), np.empty(0, dtype=CORNER))
 
 
 def footprint_pieces(footprint: Footprint, center: tuple[float, float]) -> Pieces:
