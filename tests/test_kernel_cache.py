@@ -6,6 +6,9 @@ import os
 from pathlib import Path
 
 import pytest
+from numba import config
+from numba.core.caching import _CacheLocator
+from numba.misc.appdirs import AppDirs
 
 from cbrrt_ompl.kernel_cache import drop_stale_kernels
 
@@ -30,6 +33,24 @@ def test_a_kernel_is_dropped_when_a_module_that_it_may_call_has_changed(package:
     os.utime(package / "callee.py", (1e9 - 100, 1e9 - 100))
     drop_stale_kernels(package)
     assert list(package.rglob("*.nbi")) == []
+
+
+@pytest.mark.parametrize("root", ["given", "of the user"])
+def test_caches_elsewhere_are_looked_through_too(
+    package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, root: str
+) -> None:
+    """With NUMBA_CACHE_DIR, and where the package's folder cannot be written."""
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "given"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "of the user"))
+    roots = {"given": tmp_path / "given", "of the user": Path(AppDirs("numba", appauthor=False).user_cache_dir)}
+    index = roots[root] / _CacheLocator.get_suitable_cache_subpath(str(package / "caller.py")) / "caller.nbi"
+    index.parent.mkdir(parents=True)
+    index.touch()
+    drop_stale_kernels(package)
+    assert index.exists()
+    os.utime(index, (1e9 - 400, 1e9 - 400))
+    drop_stale_kernels(package)
+    assert not index.exists()
 
 
 def test_a_folder_that_is_not_there_is_no_error(tmp_path: Path) -> None:

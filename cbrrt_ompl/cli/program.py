@@ -9,8 +9,12 @@ import argparse
 import io
 import os
 import re
+import signal
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType
 from typing import Any, NoReturn
 
 from cbrrt_ompl.cli import (
@@ -65,9 +69,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a name may hold what the terminal has no letters for
     try:
-        arguments = build_parser().parse_args(argv)
-        code: int = arguments.run(arguments)
-        sys.stdout.flush()
+        with _interrupted_at_once():
+            arguments = build_parser().parse_args(argv)
+            code: int = arguments.run(arguments)
+            sys.stdout.flush()
     except KeyboardInterrupt:
         print("cbrrt: interrupted", file=sys.stderr)
         return INTERRUPTED
@@ -78,6 +83,28 @@ def main(argv: Sequence[str] | None = None) -> int:
         print_error(error)
         return BAD_INPUT
     return code
+
+
+@contextmanager
+def _interrupted_at_once() -> Iterator[None]:
+    """Leave on Ctrl-C in the midst of a compilation too, which no exception may interrupt."""
+    is_ours = threading.current_thread() is threading.main_thread()
+    if not is_ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield  # ignored, as a shell does for what runs in the background, or somebody else's
+        return
+    signal.signal(signal.SIGINT, _interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    compiler = sys.modules.get("numba.core.compiler_lock")
+    if compiler is not None and compiler.global_compiler_lock.is_locked():
+        print("cbrrt: interrupted", file=sys.stderr, flush=True)
+        os._exit(INTERRUPTED)
+    signal.default_int_handler(number, frame)
 
 
 def build_parser() -> argparse.ArgumentParser:

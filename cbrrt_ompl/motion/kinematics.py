@@ -11,10 +11,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cbrrt_ompl.interrupts import hold_interrupts
 from cbrrt_ompl.kernel_cache import drop_stale_kernels
 from cbrrt_ompl.problem.robot import Limits
 
-drop_stale_kernels()  # here, since every other kernel is built on this module
+drop_stale_kernels()  # these two here, since every other kernel is built on this module
+hold_interrupts()
 
 
 @njit(cache=True)
