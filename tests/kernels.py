@@ -68,7 +68,7 @@ def drive(
     used = record_array(len(children) + 1, CHILD)
     for child, (v, omega) in enumerate(children):
         used[child] = v, omega, child - 1, 0
-    state, scene = tuple(map(float, node)), Scene(*(records.view(np.recarray) for records in scene))
+    state, scene = tuple(map(float, node)), Scene(*(a.view(np.recarray) if a.dtype.names else a for a in scene))
     margin = margin_at(*state[:3], scene, model["room"][0])
     steps = record_of(record_array(1, STEPS))
     return kernel(state, margin, sample, len(children) - 1, used, scene, record_of(model), steps)

@@ -305,9 +305,10 @@ def without_index(world: World, footprint: Footprint) -> Scene:
     pieces, corners = join((own, world.pieces))
     frame, cells = world.scene(footprint).frame.copy(), record_array(1, CELL)
     frame["roots"], frame["roots_per_metre"] = 1, 0.0
-    cells["clearance"], cells["first"], cells["count"] = -math.inf, len(own.pieces), len(world.pieces.pieces)
+    cells["clearance"], cells["count"] = -math.inf, len(world.pieces.pieces)
+    lists = np.arange(len(own.pieces), len(pieces), dtype=np.int32)
     as_those_of = world.scene(footprint)
-    return Scene(frame, cells, pieces.view(type(as_those_of.pieces)), corners.view(type(as_those_of.corners)))
+    return Scene(frame, cells, lists, pieces.view(type(as_those_of.pieces)), corners.view(type(as_those_of.corners)))
 
 
 SQUARE = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])

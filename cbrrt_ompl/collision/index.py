@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from cbrrt_ompl.collision.distances import point_piece
 from cbrrt_ompl.collision.pieces import Pieces
-from cbrrt_ompl.motion.records import Records, as_records, record_allocator
+from cbrrt_ompl.motion.records import Record, Records, as_records, record_array
 from cbrrt_ompl.problem.obstacles import Bounds
 
 CELL = np.dtype(
@@ -24,13 +24,48 @@ CELL = np.dtype(
         ("y", np.float64),
         ("clearance", np.float64),  # distance of the centre from the nearest piece, negative inside one [m]
         ("child", np.int32),  # row of the first of its four children; 0 at a leaf
-        ("first", np.int32),  # leaf: its first piece
+        ("first", np.int32),  # leaf: the first entry of its list
         ("count", np.int32),  # leaf: how many pieces it has
-        ("unused", np.int32),
     ],
     align=True,
 )
 """A square; its children follow each other: left below, right below, left above, right above."""
+
+PLAN = np.dtype(
+    [
+        ("x_min", np.float64),  # bounds, outside of which squares are left empty [m]
+        ("y_min", np.float64),
+        ("x_max", np.float64),
+        ("y_max", np.float64),
+        ("side", np.float64),  # of the whole [m]
+        ("levels", np.int64),  # above the root cells
+        ("parts", np.int64),  # pieces of the footprint, which are in no list
+        ("outer", np.float64),  # radius of a disc that holds the footprint [m]
+        ("inner", np.float64),  # radius of a disc about the same centre that the footprint holds [m]
+        ("finest", np.float64),  # radius down to which cells are split [m]
+        ("slack", np.float64),  # added to all distances for rounding [m]
+    ],
+    align=True,
+)
+"""What is split, and how far."""
+
+SQUARE = np.dtype(
+    [
+        ("x", np.float64),  # middle [m]
+        ("y", np.float64),
+        ("clearance", np.float64),  # distance of the middle of the square around it from the nearest piece [m]
+        ("level", np.int64),  # how often the whole was halved
+        ("column", np.int64),  # in the level's grid; below the root cells the row of its cell
+        ("row", np.int64),
+        ("first", np.int64),  # candidates: its first
+        ("count", np.int64),  # how many it has
+    ],
+    align=True,
+)
+"""A square that waits to be made a leaf or split."""
+
+MOST_SQUARES = 512
+"""Squares that wait at once: three for every level, of which doubles have no more than these."""
 
 LONG_LIST = 3
 """Lists up to this length are not worth shortening."""
@@ -65,7 +100,7 @@ def build_index(
     side: float,
     outer: float,
     inner: float,
-) -> tuple[Records, Records, int]:
+) -> tuple[Records, NDArray[np.int32], int]:
     """Quadtrees over a square that holds the bounds.
 
     Args:
@@ -78,152 +113,133 @@ def build_index(
         inner: radius of a disc about the same centre that the footprint holds [m].
 
     Returns:
-        The cells, records of type `CELL`; the pieces of the footprint and then those of the leaves; and the number of
-        root cells along a side of the square.
+        The cells, records of type `CELL`; the rows of the pieces in the lists of the leaves; and the number of root
+        cells along a side of the square.
     """
     obstacles = len(world.pieces) - parts
     levels = min(MOST_ROOTS, 2 + math.ceil(0.5 * math.log2(obstacles + 1.0)))
-    finest = max(FINEST, FINEST_OF_SLACK * (outer - inner))
-    box = (*bounds.min, *bounds.max)
-    cells, listed = _build(
-        as_records(world.pieces),
-        as_records(world.corners),
-        parts,
-        (*middle, side),
-        box,
-        levels,
-        outer,
-        inner,
-        finest,
-        SLACK * side,
-    )
-    return cells, np.concatenate([world.pieces[:parts], world.pieces[listed]]), 2**levels
-
-
-_new_cells = record_allocator(CELL)
+    plan = record_array(1, PLAN)
+    plan[0] = (
+        (*bounds.min, *bounds.max, side, levels, parts, outer, inner)
+        + (max(FINEST, FINEST_OF_SLACK * (outer - inner)), SLACK * side)
+    )  # fmt: skip
+    room = 16 * (4**levels + obstacles)
+    while True:
+        cells, listed = record_array(room, CELL), np.empty(room, dtype=np.int32)
+        candidates, distances = np.empty(room, dtype=np.int32), np.empty(room)
+        candidates[:obstacles], distances[:obstacles] = np.arange(parts, len(world.pieces)), -math.inf
+        squares = record_array(MOST_SQUARES, SQUARE)
+        squares[0] = (*middle, math.inf, 0, 0, 0, 0, obstacles)
+        used, count = _build(
+            as_records(world.pieces), as_records(world.corners), plan[0], cells, listed, squares, candidates, distances
+        )
+        if used > 0:
+            return cells[:used].copy(), listed[:count].copy(), 2**levels
+        room *= 4
 
 
 @njit(cache=True)
 def _build(
     pieces: Records,
     corners: Records,
-    parts: int,
-    square: tuple[float, float, float],
-    box: tuple[float, float, float, float],
-    levels: int,
-    outer: float,
-    inner: float,
-    finest: float,
-    slack: float,
-) -> tuple[Records, NDArray[np.int32]]:
-    """Split squares depth first; the list of each lies behind that of the square which it is a part of.
+    plan: Record,
+    cells: Records,
+    listed: NDArray[np.int32],
+    squares: Records,
+    candidates: NDArray[np.int32],
+    distances: NDArray[np.float64],
+) -> tuple[int, int]:
+    """Split squares depth first; the candidates of each lie behind those of the square which it is a part of.
 
     Args:
         pieces: all pieces.
         corners: what polygons among them refer to.
-        parts: pieces of the footprint, which are in no list.
-        square: centre and side of the whole [m].
-        box: bounds; squares outside of them are left empty [m].
-        levels: levels above the root cells.
-        outer: see :func:`build_index`.
-        inner: see :func:`build_index`.
-        finest: radius down to which cells are split [m].
-        slack: added to all distances for rounding [m].
+        plan: a record of type `PLAN`.
+        cells: room for the cells, zeros.
+        listed: room for the numbers of the pieces in the lists of the leaves.
+        squares: room for squares that wait, the first of which is the whole; records of type `SQUARE`.
+        candidates: room for the numbers of pieces, the first of which are those that are near the whole.
+        distances: as much room for their distances from the middles of their squares [m].
 
     Returns:
-        The cells, and the numbers of the pieces in their lists.
+        How many cells and entries of lists there are; (0, 0) where they need more room.
     """
-    roots = 1 << levels
-    cells = _new_cells(max(2 * roots * roots, 64))
-    used = roots * roots
-    waiting = np.empty((4 * (levels + 64), 7))  # level, column and row or cell, centre, the list of its parent
-    candidates: NDArray[np.int32] = np.empty(max(64, 8 * len(pieces)), dtype=np.int32)
-    distances = np.empty(len(pieces))
-    listed: NDArray[np.int32] = np.empty(max(64, 4 * len(pieces)), dtype=np.int32)
-    count = 0
-    for i in range(parts, len(pieces)):
-        candidates[i - parts] = i
-    waiting[0, 0], waiting[0, 1], waiting[0, 2] = 0.0, 0.0, 0.0
-    waiting[0, 3], waiting[0, 4], waiting[0, 5], waiting[0, 6] = square[0], square[1], 0.0, len(pieces) - parts
-    depth = 1
-    while depth > 0:
-        depth -= 1
-        level, x, y = int(waiting[depth, 0]), waiting[depth, 3], waiting[depth, 4]
-        column, row = int(waiting[depth, 1]), int(waiting[depth, 2])
-        first, length = int(waiting[depth, 5]), int(waiting[depth, 6])
-        side = square[2] / 2.0**level
+    roots = 1 << plan.levels
+    used, count = roots * roots, 0
+    waiting = 1
+    while waiting > 0:
+        waiting -= 1
+        square = squares[waiting]
+        level, column, row, x, y = square.level, square.column, square.row, square.x, square.y
+        side = plan.side / 2.0**level
         radius = math.sqrt(0.5) * side
-        if x + radius < box[0] or x - radius > box[2] or y + radius < box[1] or y - radius > box[3]:
+        if x + radius < plan.x_min or x - radius > plan.x_max or y + radius < plan.y_min or y - radius > plan.y_max:
             continue
+        first, start = square.first, square.first + square.count
+        if start + square.count > len(candidates) or count + square.count > len(listed) or used + 4 > len(cells):
+            return 0, 0
+        # A piece is as far from here as from the middle of the square around, give or take the radius.
+        spread = 2.0 * radius + plan.outer - plan.inner + plan.slack
+        limit = square.clearance + radius + spread
         nearest = math.inf
-        for k in range(length):
-            distances[k] = point_piece(x, y, pieces[candidates[first + k]], corners)
-            nearest = min(nearest, distances[k])
-        limit = nearest + 2.0 * radius + outer - inner + slack
-        if nearest + radius + slack < inner:  # all of the cell is in collision with the nearest
+        found = start
+        for k in range(first, start):
+            if distances[k] - radius <= limit:
+                distance = point_piece(x, y, pieces[candidates[k]], corners)
+                if distance < nearest:
+                    nearest = distance
+                    limit = min(limit, nearest + spread)
+                if distance <= limit:
+                    candidates[found], distances[found] = candidates[k], distance
+                    found += 1
+        if nearest + radius + plan.slack < plan.inner:  # all of the square is in collision with the nearest
             limit = nearest
-        kept, start = 0, first + length
-        if start + length > len(candidates):
-            candidates = np.concatenate((candidates, np.empty(len(candidates) + length, dtype=np.int32)))
-        for k in range(length):
+        end = start
+        for k in range(start, found):
             if distances[k] <= limit:
-                candidates[start + kept] = candidates[first + k]
-                kept += 1
+                candidates[end], distances[end] = candidates[k], distances[k]
+                end += 1
         is_full = count > MOST_LISTED + 8 * len(pieces)
-        if is_full or not _is_worth_splitting(nearest, radius, kept, outer, inner, finest):
-            if count + kept > len(listed):
-                listed = np.concatenate((listed, np.empty(len(listed) + kept, dtype=np.int32)))
-            for k in range(kept):
-                listed[count + k] = candidates[start + k]
-            width = 1 << max(levels - level, 0)  # root cells that this leaf stands for
+        if is_full or not _is_worth_splitting(plan, nearest, radius, end - start):
+            for k in range(start, end):
+                listed[count + k - start] = candidates[k]
+            width = 1 << max(plan.levels - level, 0)  # root cells that this leaf stands for
             for above in range(width):
                 for right in range(width):
-                    cell = column if level > levels else (row * width + above) * roots + column * width + right
+                    cell = column if level > plan.levels else (row * width + above) * roots + column * width + right
                     cells[cell].x, cells[cell].y, cells[cell].clearance = x, y, nearest
-                    cells[cell].first, cells[cell].count = parts + count, kept
-            count += kept
+                    cells[cell].first, cells[cell].count = count, end - start
+            count += end - start
             continue
-        children = -1
-        if level >= levels:
-            cell = row * roots + column if level == levels else column
-            cells[cell].x, cells[cell].y, cells[cell].clearance = x, y, nearest
-            if used + 4 > len(cells):
-                more = _new_cells(2 * len(cells))
-                more[: len(cells)] = cells
-                cells = more
-            children = cells[cell].child = used
+        child = 0
+        if level >= plan.levels:
+            cell = row * roots + column if level == plan.levels else column
+            cells[cell].x, cells[cell].y, cells[cell].clearance, cells[cell].child = x, y, nearest, used
+            child = used
             used += 4
-        for child in range(4):
-            right, above = child & 1, child >> 1
-            if level < levels:
-                waiting[depth, 1], waiting[depth, 2] = 2 * column + right, 2 * row + above
-            else:
-                waiting[depth, 1], waiting[depth, 2] = children + child, 0
-            waiting[depth, 0] = level + 1
-            waiting[depth, 3] = x + (0.25 if right else -0.25) * side
-            waiting[depth, 4] = y + (0.25 if above else -0.25) * side
-            waiting[depth, 5], waiting[depth, 6] = start, kept
-            depth += 1
-    return cells[:used].copy(), listed[:count].copy()
+        for quarter in range(4):
+            right, above = quarter & 1, quarter >> 1
+            part = squares[waiting]
+            part.level, part.first, part.count, part.clearance = level + 1, start, end - start, nearest
+            part.column, part.row = (child + quarter, 0) if child > 0 else (2 * column + right, 2 * row + above)
+            part.x, part.y = x + (0.5 * right - 0.25) * side, y + (0.5 * above - 0.25) * side
+            waiting += 1
+    return used, count
 
 
 @njit(cache=True)
-def _is_worth_splitting(
-    clearance: float, radius: float, length: int, outer: float, inner: float, finest: float
-) -> bool:
+def _is_worth_splitting(plan: Record, clearance: float, radius: float, length: int) -> bool:
     """Whether the children of a cell answer faster than the cell.
 
     Args:
+        plan: a record of type `PLAN`.
         clearance: distance of its centre from everything [m].
         radius: of the circle around it [m].
         length: pieces in its list.
-        outer: see :func:`build_index`.
-        inner: see :func:`build_index`.
-        finest: see :func:`_build`.
     """
-    if length == 0 or clearance + radius < inner:
+    if length == 0 or clearance + radius < plan.inner:
         return False
-    room = clearance - outer
+    room = clearance - plan.outer
     if radius > room:  # somewhere in the cell pieces have to be looked at
-        return length > LONG_LIST and 0.5 * radius > finest
+        return length > LONG_LIST and 0.5 * radius > plan.finest
     return radius > GOOD_BOUND * room and radius > COARSEST

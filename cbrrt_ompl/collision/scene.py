@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from cbrrt_ompl.collision.index import build_index
 from cbrrt_ompl.collision.pieces import Pieces, footprint_pieces, join
@@ -44,8 +45,10 @@ class Scene(NamedTuple):
     """One record of type `FRAME`, shape (1,)."""
     cells: Records
     """Quadtrees over the bounds, the roots in rows: see :data:`cbrrt_ompl.collision.index.CELL`, shape (n,)."""
+    lists: NDArray[np.int32]
+    """Rows of the pieces that each leaf needs, one leaf after the other, shape (l,)."""
     pieces: Records
-    """Parts of the footprint, then the pieces that each leaf needs, one leaf after the other; shape (m,)."""
+    """Parts of the footprint, then the pieces of the world; shape (m,)."""
     corners: Records
     """What the polygons among the pieces refer to, shape (k,)."""
 
@@ -71,9 +74,9 @@ def make_scene(bounds: Bounds, world: Pieces, footprint: Footprint) -> Scene:
     side = max(bounds.size)
     middle = (0.5 * (bounds.min[0] + bounds.min[0] + side), 0.5 * (bounds.min[1] + bounds.min[1] + side))
     together = join((own, world))
-    cells, pieces, roots = build_index(together, len(own.pieces), bounds, middle, side, f["outer"], f["inner"])
+    cells, lists, roots = build_index(together, len(own.pieces), bounds, middle, side, f["outer"], f["inner"])
     f["roots"], f["roots_per_metre"] = roots, roots / side
-    return Scene(frame, as_records(cells), as_records(pieces), as_records(together.corners))
+    return Scene(frame, cells, lists, as_records(together.pieces), as_records(together.corners))
 
 
 def footprint_center(footprint: Footprint) -> tuple[float, float]:

@@ -219,6 +219,7 @@ def extend_values(
     children: Records,
     frame: Records,
     cells: Records,
+    lists: NDArray[np.int32],
     pieces: Records,
     corners: Records,
     models: Records,
@@ -226,7 +227,7 @@ def extend_values(
     extensions: Records,
 ) -> int:
     """:func:`extend` for a caller in Python: arrays in; the outcome, the end in ``sample`` and a record out."""
-    scene, model, found = Scene(frame, cells, pieces, corners), models[0], extensions[0]
+    scene, model, found = Scene(frame, cells, lists, pieces, corners), models[0], extensions[0]
     state = (node[0], node[1], node[2], node[3], node[4])
     margin = margin_at(node[0], node[1], node[2], scene, model.room)
     extension = extend(state, margin, (sample[0], sample[1]), first_child, children, scene, model, blocks[0])

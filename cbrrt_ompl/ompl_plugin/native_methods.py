@@ -66,9 +66,11 @@ CHECKER_RECORD = np.dtype(
     [
         ("frame", np.int64),  # addresses of the scene's arrays
         ("cells", np.int64),
+        ("lists", np.int64),
         ("pieces", np.int64),
         ("corners", np.int64),
         ("cell_count", np.int64),  # and their lengths
+        ("list_count", np.int64),
         ("piece_count", np.int64),
         ("corner_count", np.int64),
         ("position_bounds", np.int64),  # addresses of the vectors of the lows, each followed by that of the highs
@@ -82,9 +84,11 @@ SAMPLER_RECORD = np.dtype(
     [
         ("frame", np.int64),  # as above
         ("cells", np.int64),
+        ("lists", np.int64),
         ("pieces", np.int64),
         ("corners", np.int64),
         ("cell_count", np.int64),
+        ("list_count", np.int64),
         ("piece_count", np.int64),
         ("corner_count", np.int64),
         ("model", np.int64),
@@ -110,6 +114,7 @@ def scene_of(record: Any) -> Scene:
     return Scene(
         carray(pointer(record.frame), 1, FRAME),
         carray(pointer(record.cells), record.cell_count, CELL),
+        carray(pointer(record.lists), record.list_count, np.int32),
         carray(pointer(record.pieces), record.piece_count, PIECE),
         carray(pointer(record.corners), record.corner_count, CORNER),
     )
@@ -119,8 +124,8 @@ def enter_scene(record: Records, scene: Scene) -> None:
     """Tell a record the arrays of a scene; whoever keeps the record keeps the scene."""
     for name in Scene._fields:
         record[name] = getattr(scene, name).ctypes.data
-    record["cell_count"], record["piece_count"] = len(scene.cells), len(scene.pieces)
-    record["corner_count"] = len(scene.corners)
+    record["cell_count"], record["list_count"] = len(scene.cells), len(scene.lists)
+    record["piece_count"], record["corner_count"] = len(scene.pieces), len(scene.corners)
 
 
 # propagate
