@@ -67,7 +67,7 @@ SQUARE = np.dtype(
 MOST_SQUARES = 512
 """Squares that wait at once: three for every level, of which doubles have no more than these."""
 
-LONG_LIST = 3
+LONG_LIST = 4
 """Lists up to this length are not worth shortening."""
 
 FINEST = 0.08
@@ -76,7 +76,7 @@ FINEST = 0.08
 FINEST_OF_SLACK = 0.25
 """The same as a fraction of what the footprint's discs differ by: finer cells have the same lists."""
 
-COARSEST = 0.25
+COARSEST = 0.4
 """Cells far from everything are split while a circle around them is larger than this [m]..."""
 
 GOOD_BOUND = 0.5

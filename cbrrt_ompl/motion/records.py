@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, TypeAlias
 
 import numpy as np
-from numba import config, njit
+from numba import config
 from numpy.typing import NDArray
 
 _IS_PLAIN = bool(getattr(config, "DISABLE_JIT", False))
@@ -29,15 +29,3 @@ def record_array(count: int, dtype: np.dtype[Any]) -> Records:
 def as_records(array: Records) -> Records:
     """An array as :func:`record_array` makes it, without a copy."""
     return array.view(np.recarray) if _IS_PLAIN else array
-
-
-def record_allocator(dtype: np.dtype[Any]) -> Any:
-    """A kernel that makes records of zeros, shape (count,), from their number."""
-    if _IS_PLAIN:
-        return lambda count: record_array(count, dtype)
-
-    @njit
-    def allocate(count: int) -> Records:
-        return np.zeros(count, dtype)
-
-    return allocate
