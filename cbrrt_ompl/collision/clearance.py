@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from cbrrt_ompl.collision.distances import part_piece, point_piece, rectangle_rectangle
 from cbrrt_ompl.collision.pieces import RECTANGLE
 from cbrrt_ompl.collision.scene import Scene
+from cbrrt_ompl.kernels import inner_kernel, kernel
 from cbrrt_ompl.motion.kinematics import sine_cosine
 from cbrrt_ompl.motion.records import Record, Records
 
@@ -21,7 +21,7 @@ ENOUGH = 0.1
 """Clearance from which on a bound below it does for a motion: it proves the next decimetre [m]."""
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def wall_distance(frame: Record, x: float, y: float) -> float:
     """Distance of a point from the bounds [m]; `OUTSIDE` outside, and for NaN."""
     if not (frame.x_min < x < frame.x_max and frame.y_min < y < frame.y_max):  # NaN is not, and min() may ignore it
@@ -29,7 +29,7 @@ def wall_distance(frame: Record, x: float, y: float) -> float:
     return min(min(x - frame.x_min, frame.x_max - x), min(y - frame.y_min, frame.y_max - y))
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def leaf_at(scene: Scene, x: float, y: float) -> int:
     """Row of the leaf that holds a position inside the bounds."""
     frame, cells = scene.frame[0], scene.cells
@@ -44,7 +44,7 @@ def leaf_at(scene: Scene, x: float, y: float) -> int:
     return cell
 
 
-@njit(cache=True, forceinline=True)
+@kernel(forceinline=True)
 def clearance(scene: Scene, x: float, y: float, theta: float, enough: float) -> tuple[float, bool]:
     """Distance of the footprint at a pose from the nearest obstacle or wall.
 
@@ -65,7 +65,7 @@ def clearance(scene: Scene, x: float, y: float, theta: float, enough: float) -> 
     return _clearance_of_polygon(scene, x, y, theta, enough)
 
 
-@njit(cache=True, forceinline=True)
+@inner_kernel(forceinline=True)
 def _clearance_of_disc(scene: Scene, x: float, y: float, enough: float) -> float:
     """:func:`clearance` of a round footprint."""
     frame = scene.frame[0]
@@ -85,7 +85,7 @@ def _clearance_of_disc(scene: Scene, x: float, y: float, enough: float) -> float
     return found
 
 
-@njit(cache=True, forceinline=True)
+@inner_kernel(forceinline=True)
 def _clearance_of_polygon(scene: Scene, x: float, y: float, theta: float, enough: float) -> tuple[float, bool]:
     """:func:`clearance` of a footprint with corners."""
     frame, lists, pieces, corners = scene.frame[0], scene.lists, scene.pieces, scene.corners
@@ -139,7 +139,7 @@ def _clearance_of_polygon(scene: Scene, x: float, y: float, theta: float, enough
     return found, False
 
 
-@njit(cache=True)
+@inner_kernel
 def _distance_from_walls(scene: Scene, x: float, y: float, c: float, s: float) -> float:
     """Distance of the footprint from the bounds, by its corners, its centre at (x, y) [m]."""
     frame, corners = scene.frame[0], scene.corners
@@ -151,7 +151,7 @@ def _distance_from_walls(scene: Scene, x: float, y: float, c: float, s: float) -
     return found
 
 
-@njit(cache=True)
+@kernel
 def clearance_at(
     frame: Records,
     cells: Records,
@@ -166,7 +166,7 @@ def clearance_at(
     return clearance(Scene(frame, cells, lists, pieces, corners), x, y, theta, math.inf)[0]
 
 
-@njit(cache=True)
+@kernel
 def clearances_at(scene: Scene, poses: NDArray[np.float64]) -> NDArray[np.float64]:
     """The exact :func:`clearance` at poses (x, y, theta), shape (n, 3) to (n,) [m]."""
     found = np.empty(len(poses))

@@ -9,15 +9,14 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from cbrrt_ompl.collision.pieces import DISC, RECTANGLE
+from cbrrt_ompl.kernels import inner_kernel, kernel
 from cbrrt_ompl.motion.records import Record, Records
 
 INFINITY = math.inf
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def point_rectangle(x: float, y: float, half_x: float, half_y: float) -> float:
     """Signed distance of a point from a rectangle about zero: minus its depth inside [m]."""
     beyond_x, beyond_y = abs(x) - half_x, abs(y) - half_y
@@ -25,14 +24,14 @@ def point_rectangle(x: float, y: float, half_x: float, half_y: float) -> float:
     return math.sqrt(out_x * out_x + out_y * out_y) + min(max(beyond_x, beyond_y), 0.0)
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def squared_from_rectangle(x: float, y: float, half_x: float, half_y: float) -> float:
     """Squared distance of a point from a rectangle about zero, 0 inside [m^2]."""
     out_x, out_y = max(abs(x) - half_x, 0.0), max(abs(y) - half_y, 0.0)
     return out_x * out_x + out_y * out_y
 
 
-@njit(cache=True, forceinline=True)
+@inner_kernel(forceinline=True)
 def point_polygon(x: float, y: float, corners: Records, first: int, count: int) -> float:
     """Signed distance of a point from a convex polygon: minus its depth inside [m].
 
@@ -57,7 +56,7 @@ def point_polygon(x: float, y: float, corners: Records, first: int, count: int) 
     return math.sqrt(squared) if outside > 0.0 else outside
 
 
-@njit(cache=True, forceinline=True)
+@inner_kernel(forceinline=True)
 def point_piece(x: float, y: float, piece: Record, corners: Records) -> float:
     """Signed distance of a point from a piece: minus its depth inside [m].
 
@@ -76,7 +75,7 @@ def point_piece(x: float, y: float, piece: Record, corners: Records) -> float:
     return point_polygon(x, y, corners, piece.first, piece.count)
 
 
-@njit(cache=True, forceinline=True)
+@inner_kernel(forceinline=True)
 def rectangle_rectangle(
     own_x: float, own_y: float, x: float, y: float, half_x: float, half_y: float, c: float, s: float, enough: float
 ) -> float:
@@ -127,14 +126,14 @@ def rectangle_rectangle(
     return math.sqrt(min(squared, squared_back))
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def squared_from_edge(height: float, along: float, length: float) -> float:
     """Squared distance of a point from an edge, by its height above the line and its place along it [m^2]."""
     beyond = max(max(-along, along - length), 0.0)
     return height * height + beyond * beyond
 
 
-@njit(cache=True)
+@inner_kernel
 def polygon_rectangle(
     corners: Records,
     first: int,
@@ -179,7 +178,7 @@ def polygon_rectangle(
     return math.sqrt(squared) if outside > 0.0 else outside
 
 
-@njit(cache=True)
+@inner_kernel
 def polygon_polygon(corners: Records, part: Record, other: Record, x: float, y: float, c: float, s: float) -> float:
     """Distance of a convex polygon at a pose from one in the world [m].
 
@@ -216,7 +215,7 @@ def polygon_polygon(corners: Records, part: Record, other: Record, x: float, y: 
     return math.sqrt(squared) if outside > 0.0 else outside
 
 
-@njit(cache=True, forceinline=True)
+@inner_kernel(forceinline=True)
 def part_piece(corners: Records, part: Record, piece: Record, x: float, y: float, c: float, s: float) -> float:
     """Distance of a footprint's convex part at a pose from a piece of the world [m].
 

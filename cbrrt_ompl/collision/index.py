@@ -10,11 +10,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from cbrrt_ompl.collision.distances import point_piece
 from cbrrt_ompl.collision.pieces import Pieces
+from cbrrt_ompl.kernels import inner_kernel, kernel
 from cbrrt_ompl.motion.records import Record, Records, as_records, record_array
 from cbrrt_ompl.problem.obstacles import Bounds
 
@@ -138,7 +138,7 @@ def build_index(
         room *= 4
 
 
-@njit(cache=True)
+@kernel
 def _build(
     pieces: Records,
     corners: Records,
@@ -227,7 +227,7 @@ def _build(
     return used, count
 
 
-@njit(cache=True)
+@inner_kernel
 def _is_worth_splitting(plan: Record, clearance: float, radius: float, length: int) -> bool:
     """Whether the children of a cell answer faster than the cell.
 

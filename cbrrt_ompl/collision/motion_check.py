@@ -8,11 +8,11 @@ than that; few poses of a motion are looked at.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from cbrrt_ompl.collision.clearance import ENOUGH, clearance
 from cbrrt_ompl.collision.scene import Scene
+from cbrrt_ompl.kernels import inner_kernel, kernel
 from cbrrt_ompl.motion.kinematics import unicycle_step
 from cbrrt_ompl.motion.model import ROOM
 from cbrrt_ompl.motion.records import Record
@@ -36,7 +36,7 @@ def is_free(states: NDArray[np.float64], dt: float, scene: Scene, room: float = 
     return bool(_are_rows_free(np.ascontiguousarray(states, dtype=np.float64), dt, scene, room))
 
 
-@njit(cache=True)
+@kernel
 def _are_rows_free(states: NDArray[np.float64], dt: float, scene: Scene, room: float) -> bool:
     """:func:`is_free`, compiled."""
     distance, any_heading = clearance(scene, states[0, 0], states[0, 1], states[0, 2], ENOUGH)
@@ -56,7 +56,7 @@ def _are_rows_free(states: NDArray[np.float64], dt: float, scene: Scene, room: f
     return True
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def lever_arm(frame: Record, any_heading: bool) -> float:
     """How far a turn moves what a margin is about, a radian at most [m].
 
@@ -67,7 +67,7 @@ def lever_arm(frame: Record, any_heading: bool) -> float:
     return frame.center_distance if any_heading else frame.reach
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def way_of_step(
     start: tuple[float, float, float, float, float],
     end: tuple[float, float, float, float, float],
@@ -85,7 +85,7 @@ def way_of_step(
     return (max(abs(start[3]), abs(end[3])) + arm * max(abs(start[4]), abs(end[4]))) * dt
 
 
-@njit(cache=True)
+@inner_kernel
 def check_step_motion(
     start: tuple[float, float, float, float, float],
     end: tuple[float, float, float, float, float],
@@ -144,7 +144,7 @@ def check_step_motion(
             return at_end, any_heading_at_end
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _points_proven(margin: float, way: float, points: int) -> int:
     """How many points of a step, beside that of the margin, a margin proves to be free."""
     return int(min(margin * points / way, points)) if way > 1e-12 * points else points

@@ -14,12 +14,12 @@ from functools import cached_property
 from numbers import Integral
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.collision.pieces import Pieces, join, obstacle_pieces, rectangle_pieces
 from cbrrt_ompl.errors import MapError, Problem, Remark
+from cbrrt_ompl.kernels import inner_kernel, kernel
 from cbrrt_ompl.problem.obstacles import MAX_COORDINATE, Bounds, Box, Obstacle, OrientedBox, Polygon
 
 UNKNOWN, FREE, OCCUPIED = -1, 0, 100
@@ -326,7 +326,7 @@ def _outer_corners(shape: tuple[int, ...], resolution: float, origin: Sequence[f
     return triangles
 
 
-@njit(cache=True)
+@kernel
 def _runs(blocked: NDArray[np.bool_]) -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:
     """How many true cells follow each other from every cell on: along its row, and along its column."""
     rows, columns = blocked.shape
@@ -342,7 +342,7 @@ def _runs(blocked: NDArray[np.bool_]) -> tuple[NDArray[np.uint16], NDArray[np.ui
     return along_row, along_column
 
 
-@njit(cache=True)
+@kernel
 def _cover(
     blocked: NDArray[np.bool_],
     along_row: NDArray[np.uint16],
@@ -378,7 +378,7 @@ def _cover(
     return n
 
 
-@njit(cache=True)
+@inner_kernel
 def _largest_above(along_row: NDArray[np.uint16], along_column: NDArray[np.uint16], r: int, c: int) -> tuple[int, int]:
     """Height and width of the largest rectangle of true cells with its lower left corner in a cell."""
     tallest = int(along_column[r, c])

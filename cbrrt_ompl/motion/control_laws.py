@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.motion.kinematics import clamp, saturate, wrap_angle
 from cbrrt_ompl.motion.laws import law_command
 from cbrrt_ompl.problem.robot import Gains, Limits
 
 
-@njit(cache=True)
+@kernel
 def reference_pose(
     x: float, y: float, theta: float, x_sample: float, y_sample: float, look_ahead: float
 ) -> tuple[float, float, float]:
@@ -39,7 +38,7 @@ def reference_pose(
     return x + share * dx, y + share * dy, wrap_angle(math.atan2(dy, dx))
 
 
-@njit(cache=True)
+@kernel
 def error_posture(
     x: float, y: float, theta: float, reference: tuple[float, float, float]
 ) -> tuple[float, float, float]:
@@ -59,7 +58,7 @@ def error_posture(
     return c * dx + s * dy, c * dy - s * dx, wrap_angle(reference[2] - theta)
 
 
-@njit(cache=True)
+@kernel
 def kanayama_command(
     error: tuple[float, float, float], v_reference: float, omega_reference: float, gains: Gains
 ) -> tuple[float, float]:
@@ -80,7 +79,7 @@ def kanayama_command(
     return v, omega
 
 
-@njit(cache=True)
+@kernel
 def tracking_command(
     x: float,
     y: float,
@@ -116,7 +115,7 @@ def tracking_command(
     return saturate(v, omega, limits)
 
 
-@njit(cache=True)
+@kernel
 def steering_rate(choice: int, limits: Limits) -> float:
     """Turning rate of S-RRT for a choice of 0, 1 or 2: full right, straight on or full left [rad/s]."""
     if choice == 0:

@@ -8,18 +8,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from cbrrt_ompl.interrupts import hold_interrupts
-from cbrrt_ompl.kernel_cache import drop_stale_kernels
+from cbrrt_ompl.kernels import inner_kernel, kernel
 from cbrrt_ompl.problem.robot import Limits
 
-drop_stale_kernels()  # these two here, since every other kernel is built on this module
-hold_interrupts()
 
-
-@njit(cache=True)
+@kernel
 def wrap_angle(angle: float) -> float:
     """Angle in [-pi, pi), the half-open interval of OMPL's SO(2).
 
@@ -35,13 +30,13 @@ def wrap_angle(angle: float) -> float:
     return wrapped if -math.pi <= wrapped < math.pi else -math.pi
 
 
-@njit(cache=True)
+@kernel
 def clamp(value: float, low: float, high: float) -> float:
     """The number nearest to value in [low, high]."""
     return low if value < low else high if value > high else value
 
 
-@njit(cache=True)
+@kernel
 def ramp(current: float, command: float, largest_change: float) -> float:
     """Velocity one step later: Eq. (3) and (4) of the paper.
 
@@ -61,7 +56,7 @@ def ramp(current: float, command: float, largest_change: float) -> float:
     return command
 
 
-@njit(cache=True)
+@kernel
 def has_wheel_limits(limits: Limits) -> bool:
     """:attr:`cbrrt_ompl.problem.robot.Limits.has_wheel_limits`, for kernels."""
     return limits.wheel_speed < math.inf or limits.wheel_acceleration < math.inf
@@ -74,7 +69,7 @@ WITHIN = 1.0 + 1e-12
 """Rounding by which a command may be out of reach and be reached, as one that was computed to be just in reach."""
 
 
-@njit(cache=True)
+@kernel
 def saturate(v: float, omega: float, limits: Limits) -> tuple[float, float]:
     """The fastest command on the same arc, no faster than asked for, that the wheels can drive.
 
@@ -94,7 +89,7 @@ def saturate(v: float, omega: float, limits: Limits) -> tuple[float, float]:
     return v * share, omega * share
 
 
-@njit(cache=True)
+@kernel
 def axis_limits(limits: Limits) -> Limits:
     """Limits that hold for driving straight on and for turning on the spot, those of the wheels included."""
     if not has_wheel_limits(limits):
@@ -124,7 +119,7 @@ def axis_limits(limits: Limits) -> Limits:
     )
 
 
-@njit(cache=True)
+@kernel
 def joint_ramp_time(dv: float, domega: float, limits: Limits) -> float:
     """Time in which both velocities change by (dv, domega) at once, [m/s, rad/s] to [s]."""
     size, turn = abs(dv), abs(domega)
@@ -132,19 +127,19 @@ def joint_ramp_time(dv: float, domega: float, limits: Limits) -> float:
     return max(time, (size + 0.5 * limits.wheel_separation * turn) / limits.wheel_acceleration)
 
 
-@njit(cache=True)
+@kernel
 def stopping_time(v: float, omega: float, limits: Limits) -> float:
     """Time in which a robot that brakes no longer drives, though it may still turn [s]."""
     return joint_ramp_time(v, omega, limits) if has_wheel_limits(limits) else abs(v) / limits.acceleration
 
 
-@njit(cache=True)
+@inner_kernel
 def stopping_time_of_turn(v: float, omega: float, limits: Limits) -> float:
     """Time in which a robot that brakes no longer turns, though it may still drive [s]."""
     return joint_ramp_time(v, omega, limits) if has_wheel_limits(limits) else abs(omega) / limits.angular_acceleration
 
 
-@njit(cache=True)
+@kernel
 def joint_ramp(
     v: float, omega: float, v_command: float, omega_command: float, limits: Limits, dt: float
 ) -> tuple[float, float]:
@@ -182,7 +177,7 @@ ONE_TWELFTH, ONE_24TH, ONE_80TH = 1.0 / 12.0, 1.0 / 24.0, 1.0 / 80.0
 """Factors, since a division takes the kernels as long as all the rest of a line."""
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def sine_cosine(angle: float) -> tuple[float, float]:
     """Sine and cosine without a branch, so that a loop over an array runs on vector registers.
 
@@ -212,13 +207,13 @@ def sine_cosine(angle: float) -> tuple[float, float]:
     return (cosine if is_odd else sine) * sign, (-sine if is_odd else cosine) * sign
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def middle_heading(theta: float, omega: float, omega_next: float, duration: float) -> float:
     """Heading in the middle of a step in which the turning rate changes linearly [rad]."""
     return theta + 0.125 * duration * (3.0 * omega + omega_next)
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def displacement(
     middle: float, v: float, omega: float, v_next: float, omega_next: float, duration: float
 ) -> tuple[float, float]:
@@ -251,7 +246,7 @@ def displacement(
     return along * c - across * s, along * s + across * c
 
 
-@njit(cache=True)
+@kernel
 def unicycle_step(
     x: float, y: float, theta: float, v: float, omega: float, v_next: float, omega_next: float, duration: float
 ) -> tuple[float, float, float]:
@@ -275,7 +270,7 @@ def unicycle_step(
     return x + dx, y + dy, wrap_angle(theta + 0.5 * (omega + omega_next) * duration)
 
 
-@njit(cache=True)
+@kernel
 def dynamic_step(
     x: float, y: float, theta: float, v: float, omega: float, command: tuple[float, float], limits: Limits, dt: float
 ) -> tuple[float, float, float, float, float]:
@@ -305,7 +300,7 @@ def dynamic_step(
     return x, y, theta, v_next, omega_next
 
 
-@njit(cache=True)
+@kernel
 def kinematic_step(
     x: float, y: float, theta: float, command: tuple[float, float], dt: float
 ) -> tuple[float, float, float, float, float]:
@@ -326,7 +321,7 @@ def kinematic_step(
     return x, y, theta, v, omega
 
 
-@njit(cache=True)
+@kernel
 def brake(
     x: float, y: float, theta: float, v: float, omega: float, limits: Limits, dt: float, most_steps: int
 ) -> NDArray[np.float64]:

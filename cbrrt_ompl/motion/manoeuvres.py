@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.motion.kinematics import axis_limits, clamp, wrap_angle
 from cbrrt_ompl.problem.robot import Limits
 
@@ -30,13 +29,13 @@ NO_TURN = -1e-12
 """Turns to the right down to this are rounding to a robot that only turns left [rad]."""
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def is_manoeuvre(control: tuple[float, float, float]) -> bool:
     """Whether a control asks for a manoeuvre."""
     return control[2] >= FORWARD
 
 
-@njit(cache=True)
+@kernel
 def next_velocity(way: float, velocity: float, low: float, high: float, largest_change: float, dt: float) -> float:
     """Velocity one step later, on the quickest way to come to rest after exactly a given way.
 
@@ -60,7 +59,7 @@ def next_velocity(way: float, velocity: float, low: float, high: float, largest_
     return 0.0 if abs(found) < AT_REST and abs(velocity) <= largest_change else found
 
 
-@njit(cache=True)
+@kernel
 def approach_command(
     state: tuple[float, float, float, float, float],
     aim: tuple[float, float, float],
@@ -111,7 +110,7 @@ def approach_command(
     return 0.0, next_velocity(turn, omega, limits.omega_min, limits.omega_max, change, dt)
 
 
-@njit(cache=True)
+@kernel
 def has_ended(
     manoeuvre: float,
     state: tuple[float, float, float, float, float],
@@ -129,7 +128,7 @@ def has_ended(
     return not has_heading or abs(wrap_angle(aim[2] - theta)) <= REACHED
 
 
-@njit(cache=True)
+@kernel
 def most_steps(manoeuvre: float, distance: float, limits: Limits, dt: float) -> int:
     """Steps within which every manoeuvre has ended, an approach over a distance [m] at its start."""
     limits = axis_limits(limits)

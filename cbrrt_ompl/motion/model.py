@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from cbrrt_ompl.errors import Problem, SettingsError
+from cbrrt_ompl.kernels import inner_kernel, kernel
 from cbrrt_ompl.motion.control_laws import steering_rate, tracking_command
 from cbrrt_ompl.motion.kinematics import dynamic_step, kinematic_step, saturate
 from cbrrt_ompl.motion.laws import GAINS, LIMITS, law_address
@@ -126,10 +126,10 @@ def check_step(robot: Robot, planning: PlanningSettings) -> None:
         raise SettingsError(Problem("planning.step", planning.step, expected))
 
 
-_goal_distance, _heading_error = njit(cache=True)(goal_distance), njit(cache=True)(heading_error)
+_goal_distance, _heading_error = kernel(goal_distance), kernel(heading_error)
 
 
-@njit(cache=True)
+@kernel
 def in_goal(goal: Record, x: float, y: float, theta: float, v: float, omega: float) -> bool:
     """Whether a state satisfies the goal, a record of type `GOAL_REGION`."""
     if not _goal_distance(goal, x, y) < goal.tolerance:
@@ -139,7 +139,7 @@ def in_goal(goal: Record, x: float, y: float, theta: float, v: float, omega: flo
     return abs(v) <= goal.speed_tolerance and abs(omega) <= goal.speed_tolerance
 
 
-@njit(cache=True, inline="always")  # a call costs as much as the step itself
+@kernel(inline="always")  # a call costs as much as the step itself
 def advance(
     x: float,
     y: float,
@@ -180,7 +180,7 @@ def advance(
     return x, y, theta, v, omega, command[0], command[1]
 
 
-@njit(cache=True)
+@inner_kernel
 def candidate(
     index: int,
     node: tuple[float, float, float, float, float],
@@ -207,7 +207,7 @@ def candidate(
     return v, omega, (v, omega, 0.0)
 
 
-@njit(cache=True)
+@inner_kernel
 def manoeuvre_command(
     state: tuple[float, float, float, float, float], manoeuvre: float, model: Record
 ) -> tuple[float, float]:
@@ -226,7 +226,7 @@ def manoeuvre_command(
     )
 
 
-@njit(cache=True)
+@inner_kernel
 def manoeuvre_has_ended(manoeuvre: float, state: tuple[float, float, float, float, float], goal: Record) -> bool:
     """Whether a manoeuvre is over, see :func:`cbrrt_ompl.motion.manoeuvres.has_ended`."""
     return has_ended(manoeuvre, state, (goal.x, goal.y, goal.theta), goal.heading_tolerance < math.inf)

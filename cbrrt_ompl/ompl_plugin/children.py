@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numba.extending import overload
 from numpy.typing import NDArray
 
+from cbrrt_ompl.kernels import inner_kernel, kernel
 from cbrrt_ompl.motion.records import Records, record_array
 from cbrrt_ompl.ompl_plugin.native_memory import bits_of
 from cbrrt_ompl.planners.extension import CHILD, NO_CHILD, UNTRIED
@@ -110,7 +110,7 @@ def _compiled_hash_of(node):  # type: ignore[no-untyped-def]  # numba compares s
     return mix
 
 
-@njit(cache=True)
+@inner_kernel
 def find_slot(node: tuple[float, float, float, float, float], parents: Records) -> int:
     """The slot of a node, or the empty one that it would get."""
     mask = len(parents) - 1
@@ -128,7 +128,7 @@ def find_slot(node: tuple[float, float, float, float, float], parents: Records) 
         i = (i + 1) & mask
 
 
-@njit(cache=True)
+@kernel
 def slot_of(node: tuple[float, float, float, float, float], parents: Records, counts: Records) -> int:
     """The slot of a node, which is entered if it was not there."""
     i = find_slot(node, parents)
@@ -140,12 +140,12 @@ def slot_of(node: tuple[float, float, float, float, float], parents: Records, co
     return i
 
 
-@njit(cache=True)
+@kernel
 def _slot_of_values(node: NDArray[np.float64], parents: Records, counts: Records) -> int:
     return slot_of((node[0], node[1], node[2], node[3], node[4]), parents, counts)
 
 
-@njit(cache=True)
+@kernel
 def add_child(slot: int, v: float, omega: float, parents: Records, records: Records, counts: Records) -> None:
     """Enter a new child of the node in a slot."""
     number = counts[0].children
@@ -156,7 +156,7 @@ def add_child(slot: int, v: float, omega: float, parents: Records, records: Reco
     counts[0].children = number + 1
 
 
-@njit(cache=True)
+@kernel
 def _move(parents: Records, larger: Records) -> None:
     """Enter all nodes of one table into another."""
     for i in range(len(parents)):

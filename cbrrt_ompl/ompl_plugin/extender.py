@@ -6,12 +6,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from cbrrt_ompl.collision.scene import Scene
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import Problem, SettingsError
+from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.motion.laws import is_compiled_law, raise_errors
 from cbrrt_ompl.motion.model import CLOSED_LOOP, MODEL, OPEN_LOOP, STEERING, check_step, make_model
 from cbrrt_ompl.motion.records import Records, record_array
@@ -211,7 +211,7 @@ class Extender:
         return found.outcome
 
 
-@njit(cache=True)
+@kernel
 def extend_values(
     node: NDArray[np.float64],
     sample: NDArray[np.float64],

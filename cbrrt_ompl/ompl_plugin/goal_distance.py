@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
 from numpy.typing import NDArray
 
+from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.motion.model import in_goal
 from cbrrt_ompl.motion.records import Record, Records
 from cbrrt_ompl.problem.settings import goal_distance, heading_error
 
 _JUST_BELOW_ONE = math.nextafter(1.0, 0.0)
-_distance, _heading_error = njit(cache=True)(goal_distance), njit(cache=True)(heading_error)
+_distance, _heading_error = kernel(goal_distance), kernel(heading_error)
 
 
-@njit(cache=True)
+@kernel
 def region_distance(goal: Record, x: float, y: float, theta: float, v: float, omega: float) -> float:
     """The largest deviation in units of its tolerance; below 1 exactly where the goal is satisfied.
 
@@ -35,7 +35,7 @@ def region_distance(goal: Record, x: float, y: float, theta: float, v: float, om
     return min(farthest, _JUST_BELOW_ONE) if in_goal(goal, x, y, theta, v, omega) else max(farthest, 1.0)
 
 
-@njit(cache=True)
+@kernel
 def region_distance_of(values: NDArray, goals: Records) -> float:
     """:func:`region_distance` for a caller in Python; values of shape (5,)."""
     return region_distance(goals[0], values[0], values[1], values[2], values[3], values[4])

@@ -11,13 +11,16 @@ from __future__ import annotations
 from typing import Any
 
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
+
+from cbrrt_ompl.kernels import inner_kernel, kernel
 
 VALUES = 8
 """Offset of the members after the word of the vtable [bytes]."""
 
 _intrinsic: Any = intrinsic  # its types take no account of the typing context that it hands over
+
 _ADDRESS, _REAL = ir.IntType(64), ir.DoubleType()
 
 
@@ -117,7 +120,7 @@ def call_propagate(_: Any, method: Any, this: Any, state: Any, control: Any, dur
     return types.void(*[types.int64] * 4, types.float64, types.int64), generate
 
 
-@njit(cache=True, forceinline=True)
+@kernel(forceinline=True)
 def read_state(state: int) -> tuple[float, float, float, float, float]:
     """(x, y, theta, v, omega) of the state at an address."""
     components = peek(state + VALUES)
@@ -132,14 +135,14 @@ def read_state(state: int) -> tuple[float, float, float, float, float]:
     )
 
 
-@njit(cache=True, forceinline=True)
+@kernel(forceinline=True)
 def read_position(state: int) -> tuple[float, float]:
     """(x, y) of the state at an address."""
     position = peek(peek(peek(state + VALUES)) + VALUES)
     return peek_real(position), peek_real(position + 8)
 
 
-@njit(cache=True, forceinline=True)
+@kernel(forceinline=True)
 def write_state(state: int, x: float, y: float, theta: float, v: float, omega: float) -> None:
     """Set the state at an address."""
     components = peek(state + VALUES)
@@ -152,14 +155,14 @@ def write_state(state: int, x: float, y: float, theta: float, v: float, omega: f
     poke_real(velocity + 8, omega)
 
 
-@njit(cache=True, forceinline=True)
+@kernel(forceinline=True)
 def read_control(control: int, dimension: int) -> tuple[float, float, float]:
     """The numbers of the control of R^2 or R^3 at an address; the third is 0 where there is none."""
     values = peek(control + VALUES)
     return peek_real(values), peek_real(values + 8), peek_real(values + 16) if dimension == 3 else 0.0
 
 
-@njit(cache=True, forceinline=True)
+@inner_kernel(forceinline=True)
 def write_control(control: int, values: tuple[float, float, float], dimension: int) -> None:
     """Set the control of R^2 or R^3 at an address."""
     numbers = peek(control + VALUES)

@@ -11,13 +11,14 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import carray, cfunc, njit, types
+from numba import carray, cfunc, types
 
 from cbrrt_ompl.collision.clearance import clearance
 from cbrrt_ompl.collision.index import CELL
 from cbrrt_ompl.collision.pieces import CORNER, PIECE
 from cbrrt_ompl.collision.scene import FRAME, Scene
 from cbrrt_ompl.collision.world import CONTACT_BAND
+from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.motion.model import GOAL_REGION, MODEL, advance
 from cbrrt_ompl.motion.records import Records, record_array
 from cbrrt_ompl.ompl_plugin.children import COUNTS, PARENT, add_child, slot_of
@@ -108,7 +109,7 @@ SAMPLER_RECORD = np.dtype(
 )
 
 
-@njit(cache=True, forceinline=True)
+@kernel(forceinline=True)
 def scene_of(record: Any) -> Scene:
     """The scene whose arrays a record tells."""
     return Scene(
@@ -164,7 +165,7 @@ def make_propagator_native(propagator: Any, model: Records, dimension: int) -> N
 # isValid
 
 
-@njit(cache=True, forceinline=True)
+@kernel(forceinline=True)
 def is_within(bounds: int, first: float, second: float) -> bool:
     """Whether two numbers are within the bounds of an R^2, whose vectors of lows and of highs begin at an address."""
     low, high = carray(pointer(bounds), 4, np.int64)[0], carray(pointer(bounds), 4, np.int64)[3]
@@ -254,7 +255,7 @@ def make_goal_native(goal: Any, region: Records) -> None:
 # sampleTo
 
 
-@njit(cache=True)
+@kernel
 def sample_to(this: int, control: int, source: int, dest: int) -> int:
     """``DirectedControlSampler::sampleTo``, through Python where arrays are full or a user's parts have to be asked."""
     record = carray(pointer(record_address(this)), 1, SAMPLER_RECORD)[0]

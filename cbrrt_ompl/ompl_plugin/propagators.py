@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.motion.laws import is_compiled_law, raise_errors
 from cbrrt_ompl.motion.model import CLOSED_LOOP, OPEN_LOOP, STEERING, advance, make_model
 from cbrrt_ompl.motion.records import Records
@@ -106,7 +106,7 @@ def drives_like(propagator: Any, model: Records) -> bool:
     )
 
 
-@njit(cache=True)
+@kernel
 def advance_values(values: NDArray[np.float64], c0: float, c1: float, c2: float, models: Records, dt: float) -> None:
     """:func:`cbrrt_ompl.motion.model.advance` in place, for a caller in Python; values of shape (5,)."""
     x, y, theta, v, omega = values[0], values[1], values[2], values[3], values[4]

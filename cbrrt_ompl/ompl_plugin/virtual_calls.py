@@ -15,9 +15,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.ompl_plugin.native_layout import (
     BEFORE_SLOTS,
     WORD,
@@ -102,7 +102,7 @@ def virtual_method(python_object: Any, class_name: str, wrapper: str, method: st
     return int(words_at(vtable, slot + 1)[slot])
 
 
-@njit(cache=True, forceinline=True)
+@kernel(forceinline=True)
 def record_address(this: int) -> int:
     """Address of an object's record, for the compiled functions of :func:`call_compiled`."""
     return peek(peek(this) - (1 + BEFORE_SLOTS) * WORD)

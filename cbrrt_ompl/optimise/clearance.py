@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from cbrrt_ompl.collision.clearance import ENOUGH, clearance, clearances_at
 from cbrrt_ompl.collision.motion_check import check_step_motion, is_free
 from cbrrt_ompl.collision.scene import Scene
+from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.motion.kinematics import brake
 from cbrrt_ompl.motion.model import motion_room
 from cbrrt_ompl.motion.records import Record
 from cbrrt_ompl.optimise.cover import cover
 from cbrrt_ompl.optimise.field import distance_at, field_of
-from cbrrt_ompl.optimise.kernels import kernel
 from cbrrt_ompl.problem.settings import MAX_STEPS
 from cbrrt_ompl.scenario.scenario import Scenario
 

@@ -13,9 +13,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from cbrrt_ompl.kernels import inner_kernel
 from cbrrt_ompl.motion.records import Record
 from cbrrt_ompl.optimise.field import distance_and_gradient, distance_at
-from cbrrt_ompl.optimise.kernels import inner_kernel
 from cbrrt_ompl.optimise.program import ALPHA, OMEGA, STEP, THETA, A, V, X, Y
 
 SMALL_SPEED = 0.01

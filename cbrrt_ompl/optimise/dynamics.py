@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.optimise.kernels import inner_kernel
+from cbrrt_ompl.kernels import inner_kernel
 from cbrrt_ompl.optimise.program import ALPHA, COLUMNS, OMEGA, STATES, STEP, THETA, A, V, X, Y
 
 GAUSS_NODES = (0.5 - math.sqrt(3.0) / 6.0, 0.5 + math.sqrt(3.0) / 6.0)

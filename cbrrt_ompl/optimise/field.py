@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from cbrrt_ompl.collision.distances import point_piece
 from cbrrt_ompl.collision.pieces import DISC
 from cbrrt_ompl.collision.world import World
+from cbrrt_ompl.kernels import inner_kernel, kernel
 from cbrrt_ompl.motion.records import Record, Records, record_array
-from cbrrt_ompl.optimise.kernels import inner_kernel, kernel
 
 LARGEST_SPACING, SMALLEST_SPACING = 0.05, 0.01
 """Range of the distance between two nodes [m], as far as `MAX_NODES` allows."""

@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from cbrrt_ompl.kernels import inner_kernel, kernel
 from cbrrt_ompl.motion.records import Record
 from cbrrt_ompl.optimise.field import distance_at
-from cbrrt_ompl.optimise.kernels import inner_kernel, kernel
 
 MOVES = (
     (1, 0), (-1, 0), (0, 1), (0, -1),

@@ -19,11 +19,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from cbrrt_ompl.kernels import inner_kernel, kernel
 from cbrrt_ompl.motion.records import Record, Records
 from cbrrt_ompl.optimise.costs import add_cost_derivatives, stage_cost
 from cbrrt_ompl.optimise.dynamics import add_derivatives, interval_end
 from cbrrt_ompl.optimise.inequalities import add_row_derivatives, evaluate_rows
-from cbrrt_ompl.optimise.kernels import inner_kernel, kernel
 from cbrrt_ompl.optimise.program import COLUMNS, CONTROLS, FIRST_COLUMNS, STATES, STEP
 from cbrrt_ompl.optimise.riccati import factorise, roll_out_step
 

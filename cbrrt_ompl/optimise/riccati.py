@@ -18,8 +18,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from cbrrt_ompl.kernels import inner_kernel
 from cbrrt_ompl.motion.records import Record, Records
-from cbrrt_ompl.optimise.kernels import inner_kernel
 from cbrrt_ompl.optimise.program import COLUMNS, CONTROLS, STATES, STEP
 
 LEAST_CURVATURE = 1e-12

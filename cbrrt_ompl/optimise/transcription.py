@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.motion.kinematics import clamp, unicycle_step
 from cbrrt_ompl.motion.records import Record, record_array
 from cbrrt_ompl.optimise.clearance import least_clearance
@@ -17,7 +18,6 @@ from cbrrt_ompl.optimise.field import field_of
 from cbrrt_ompl.optimise.guess import Guess
 from cbrrt_ompl.optimise.inequalities import lay_out_rows
 from cbrrt_ompl.optimise.interior_point import PROGRESS, SOLVE_RUNNING, iterate
-from cbrrt_ompl.optimise.kernels import kernel
 from cbrrt_ompl.optimise.objective import Objective
 from cbrrt_ompl.optimise.program import OMEGA, PROBLEM, STAGE, STEP, THETA, V
 from cbrrt_ompl.problem.robot import Limits

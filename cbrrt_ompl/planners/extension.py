@@ -6,9 +6,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from cbrrt_ompl.collision.scene import Scene
+from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.motion.control_laws import reference_pose
 from cbrrt_ompl.motion.manoeuvres import FORWARD, REVERSE
 from cbrrt_ompl.motion.model import CANDIDATES, STEERING, candidate, in_goal
@@ -48,7 +48,7 @@ class Extension(NamedTuple):
     """Control for :func:`cbrrt_ompl.motion.model.advance`."""
 
 
-@njit(cache=True, inline="always")  # as a function of its own it would be optimised again in each caller
+@kernel(inline="always")  # as a function of its own it would be optimised again in each caller
 def extend(
     node: tuple[float, float, float, float, float],
     margin: tuple[float, bool],
@@ -98,7 +98,7 @@ def extend(
     return best
 
 
-@njit(cache=True)
+@kernel
 def is_refused(first_child: int, children: Records, v: float, omega: float, tolerance: float) -> bool:
     """Line 5 of Algorithm II: whether a node has a child by (nearly) the same command.
 
@@ -118,7 +118,7 @@ def is_refused(first_child: int, children: Records, v: float, omega: float, tole
     return False
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def approach(
     node: tuple[float, float, float, float, float],
     margin: tuple[float, bool],

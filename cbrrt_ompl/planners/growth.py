@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from cbrrt_ompl.collision.scene import Scene
+from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.motion.manoeuvres import is_manoeuvre
 from cbrrt_ompl.motion.model import in_goal
 from cbrrt_ompl.motion.records import Records
@@ -65,7 +65,7 @@ SEARCH = np.dtype(
 """Settings and counters of a search, carried from call to call."""
 
 
-@njit(cache=True)
+@kernel
 def add_node(tree: Records, index: Index, number: int, parent: int) -> None:
     """Link a node whose state, command, control and steps are there already.
 
@@ -89,7 +89,7 @@ def add_node(tree: Records, index: Index, number: int, parent: int) -> None:
     insert(index, number, node.x, node.y)
 
 
-@njit(cache=True)
+@kernel
 def one_of_twins(tree: Records, place: int, draw: float) -> int:
     """A node at the position of an indexed one, all equally likely.
 
@@ -111,7 +111,7 @@ def one_of_twins(tree: Records, place: int, draw: float) -> int:
     return number
 
 
-@njit(cache=True)
+@kernel
 def tolerated_failures(draw: float) -> float:
     """Most failures with which a place is not passed over: one with f failures is with the chance f / (1 + f).
 
@@ -121,7 +121,7 @@ def tolerated_failures(draw: float) -> float:
     return 1.0 / draw - 1.0 if draw > 0.0 else math.inf
 
 
-@njit(cache=True)
+@kernel
 def grow(
     tree: Records,
     index: Index,

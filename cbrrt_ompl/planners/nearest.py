@@ -11,9 +11,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from cbrrt_ompl.kernels import inner_kernel, kernel
 from cbrrt_ompl.motion.records import Records, record_array
 from cbrrt_ompl.planners.bits import highest_bit, lowest_bit
 from cbrrt_ompl.problem.obstacles import Bounds
@@ -129,7 +129,7 @@ def with_room_for_a_search(index: Index) -> Index:
     return index._replace(stack=np.empty((2 * depth + WORD, 3))) if index.kind == KD_TREE else index
 
 
-@njit(cache=True)
+@kernel
 def _enter_again(index: Index, nodes: int) -> None:
     """Enter all places into an empty grid."""
     for node in range(nodes):
@@ -137,7 +137,7 @@ def _enter_again(index: Index, nodes: int) -> None:
             _insert_into_grid(index, node)
 
 
-@njit(cache=True)
+@kernel
 def insert(index: Index, node: int, x: float, y: float) -> None:
     """Add a place."""
     place = index.places[node]
@@ -149,13 +149,13 @@ def insert(index: Index, node: int, x: float, y: float) -> None:
     index.state[0].places += 1
 
 
-@njit(cache=True)
+@kernel
 def leave_out(index: Index, node: int) -> None:
     """Note that a node has no place of its own."""
     index.places[node].failures = NOT_INDEXED
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _cell_of(index: Index, x: float, y: float) -> tuple[int, int]:
     """Row and column of a position; positions outside fall into the nearest cell."""
     rows, columns = index.heads.shape
@@ -164,7 +164,7 @@ def _cell_of(index: Index, x: float, y: float) -> tuple[int, int]:
     return row, column
 
 
-@njit(cache=True)
+@inner_kernel
 def _insert_into_grid(index: Index, node: int) -> None:
     """Put a place in front of the others of its cell."""
     place = index.places[node]
@@ -177,7 +177,7 @@ def _insert_into_grid(index: Index, node: int) -> None:
     index.row_words[row // WORD] |= np.uint64(1) << np.uint64(row % WORD)
 
 
-@njit(cache=True)
+@inner_kernel
 def _insert_into_kd_tree(index: Index, node: int) -> None:
     """Hang a place under the leaf where it belongs; the first one ever is the root, number 0."""
     state, places = index.state[0], index.places
@@ -197,7 +197,7 @@ def _insert_into_kd_tree(index: Index, node: int) -> None:
         parent, depth, is_along_x = child, depth + 1, not is_along_x
 
 
-@njit(cache=True)
+@kernel
 def nearest(index: Index, x: float, y: float, nodes: int, most_failures: float) -> int:
     """The place nearest to a position.
 
@@ -225,7 +225,7 @@ def nearest(index: Index, x: float, y: float, nodes: int, most_failures: float) 
     return node
 
 
-@njit(cache=True)
+@inner_kernel
 def _nearest_in_grid(index: Index, x: float, y: float, most_failures: float) -> int:
     """Search the rows of cells outwards, and in each row its occupied cells outwards, as far as they can be nearer."""
     row, column = _cell_of(index, x, y)
@@ -245,7 +245,7 @@ def _nearest_in_grid(index: Index, x: float, y: float, most_failures: float) -> 
         best, node = _nearest_in_row(index, x, y, here, column, gap * gap, best, node, most_failures)
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _next_row(row_words: NDArray[np.uint64], row: int) -> int:
     """The first row from one on that holds a place, or the number of rows."""
     word = row // WORD
@@ -256,7 +256,7 @@ def _next_row(row_words: NDArray[np.uint64], row: int) -> int:
     return word * WORD + lowest_bit(bits) if bits != 0 else len(row_words) * WORD
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _last_row(row_words: NDArray[np.uint64], row: int) -> int:
     """The last row up to one that holds a place, or -1."""
     word = row // WORD  # -1 below the first row
@@ -267,7 +267,7 @@ def _last_row(row_words: NDArray[np.uint64], row: int) -> int:
     return word * WORD + highest_bit(bits) if bits != 0 else -1
 
 
-@njit(cache=True, forceinline=True)
+@inner_kernel(forceinline=True)
 def _nearest_in_row(
     index: Index,
     x: float,
@@ -328,7 +328,7 @@ def _nearest_in_row(
     return best, node
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _nearest_in_cell(
     index: Index, place: int, x: float, y: float, best: float, node: int, most_failures: float
 ) -> tuple[float, int]:
@@ -343,7 +343,7 @@ def _nearest_in_cell(
     return best, node
 
 
-@njit(cache=True)
+@inner_kernel
 def _nearest_in_kd_tree(index: Index, x: float, y: float, most_failures: float) -> int:
     """Search depth first, the nearer side first, leaving out what lies beyond the best so far."""
     places, stack = index.places, index.stack

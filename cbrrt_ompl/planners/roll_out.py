@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from cbrrt_ompl.collision.clearance import ENOUGH, clearance
 from cbrrt_ompl.collision.motion_check import check_step_motion, lever_arm, way_of_step
 from cbrrt_ompl.collision.scene import Scene
+from cbrrt_ompl.kernels import inner_kernel, kernel
 from cbrrt_ompl.motion.kinematics import (
     displacement,
     has_wheel_limits,
@@ -47,7 +47,7 @@ STEPS = np.dtype(
 """Room for the states of a block, the first of them before its first step."""
 
 
-@njit(cache=True, forceinline=True)  # else LLVM may leave it a call, which makes an extension a tenth slower
+@kernel(forceinline=True)  # else LLVM may leave it a call, which makes an extension a tenth slower
 def integrate_block(steps: Record, v_command: float, omega_command: float, count: int, model: Record) -> None:
     """Integrate some steps towards one command, with their sines on vector registers.
 
@@ -90,7 +90,7 @@ def integrate_block(steps: Record, v_command: float, omega_command: float, count
         xs[i + 1], ys[i + 1] = x, y
 
 
-@njit(cache=True)
+@inner_kernel
 def integrate_stepwise(
     steps: Record, control: tuple[float, float, float], count: int, model: Record
 ) -> tuple[int, bool]:
@@ -117,13 +117,13 @@ def integrate_stepwise(
     return count, False
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def state_at(steps: Record, i: int) -> tuple[float, float, float, float, float]:
     """The state at the end of a block's step, 0 before the first: (x, y, theta, v, omega)."""
     return steps.x[i], steps.y[i], steps.theta[i], steps.v[i], steps.omega[i]
 
 
-@njit(cache=True)
+@inner_kernel
 def first_in_goal(steps: Record, count: int, goal: Record) -> int:
     """The first step of a block that ends in the goal region, or one more than there are."""
     near = goal.tolerance * goal.tolerance * (1.0 + 1e-9)
@@ -134,7 +134,7 @@ def first_in_goal(steps: Record, count: int, goal: Record) -> int:
     return count + 1
 
 
-@njit(cache=True)
+@kernel
 def free_steps(
     steps: Record, count: int, margin: float, any_heading: bool, scene: Scene, model: Record
 ) -> tuple[int, float, bool]:
@@ -167,14 +167,14 @@ def free_steps(
     return count, margin, any_heading
 
 
-@njit(cache=True)
+@kernel
 def margin_at(x: float, y: float, theta: float, scene: Scene, room: float) -> tuple[float, bool]:
     """Margin of a valid pose beyond the room, 0 where it has less than a motion needs; and its ``any_heading``."""
     distance, any_heading = clearance(scene, x, y, theta, ENOUGH)
     return max(distance - room, 0.0), any_heading and distance > room
 
 
-@njit(cache=True)
+@kernel
 def roll_out(
     node: tuple[float, float, float, float, float],
     control: tuple[float, float, float],
@@ -230,7 +230,7 @@ def roll_out(
     return driven, MOTION_BLOCKED if is_manoeuvring else MOTION_FREE, state_at(steps, 0)
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def roll_out_brake_safe(
     node: tuple[float, float, float, float, float],
     control: tuple[float, float, float],
@@ -265,7 +265,7 @@ def roll_out_brake_safe(
     return driven, outcome, end
 
 
-@njit(cache=True)
+@inner_kernel
 def can_brake(
     state: tuple[float, float, float, float, float],
     margin: float,

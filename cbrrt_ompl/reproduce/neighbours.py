@@ -6,9 +6,9 @@ import math
 import time
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.planners.nearest import BRUTE_FORCE, KINDS, Index, insert, make_index, nearest, with_room_for_a_search
 from cbrrt_ompl.problem.obstacles import Bounds
 
@@ -69,14 +69,14 @@ def build_index(kind: int, positions: NDArray[np.float64]) -> Index:
     return with_room_for_a_search(index)
 
 
-@njit(cache=True)
+@kernel
 def fill(index: Index, positions: NDArray[np.float64]) -> None:
     """Enter positions, shape (n, 2), one after the other."""
     for node in range(len(positions)):
         insert(index, node, positions[node, 0], positions[node, 1])
 
 
-@njit(cache=True)
+@kernel
 def answer(index: Index, queries: NDArray[np.float64], count: int) -> float:
     """Ask all queries, shape (m, 2); the sum of the distances keeps the compiler from leaving them out."""
     total = 0.0

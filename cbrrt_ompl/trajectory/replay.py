@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.motion.control_laws import reference_pose
 from cbrrt_ompl.motion.laws import raise_errors
 from cbrrt_ompl.motion.model import CANDIDATES, STEERING, advance, candidate
@@ -83,7 +83,7 @@ def extension_trajectories(node: State, sample: tuple[float, float], model: Reco
     ]
 
 
-@njit(cache=True)
+@kernel
 def replay_path(
     start: NDArray[np.float64], controls: NDArray[np.float64], steps: NDArray[np.int64], models: Records
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -109,7 +109,7 @@ def replay_path(
     return states, commands
 
 
-@njit(cache=True)
+@kernel
 def replay_edges(
     states: NDArray[np.float64],
     parents: NDArray[np.int64],

@@ -1,4 +1,4 @@
-"""How the kernels of this wing are compiled."""
+"""How kernels are compiled: kept on disk, never older than their sources, never interrupted half-way."""
 
 from __future__ import annotations
 
@@ -7,8 +7,14 @@ from typing import Any
 
 from numba import njit
 
+from cbrrt_ompl.interrupts import hold_interrupts
+from cbrrt_ompl.kernel_cache import drop_stale_kernels
+
+drop_stale_kernels()
+hold_interrupts()
+
 kernel: Any = partial(njit, cache=True, error_model="numpy")
-"""Decorator of a kernel that Python calls."""
+"""Decorator of a kernel that Python calls, too; 1 / 0 is infinite in it, as in NumPy."""
 
 inner_kernel: Any = partial(njit, cache=True, error_model="numpy", no_cpython_wrapper=True)
 """Decorator of a kernel that only kernels call: it compiles in four fifths of the time; a call from Python crashes."""
