@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import io
 import os
 import shutil
 import uuid
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 from cbrrt_ompl.errors import InputError, Problem, Remark
 
@@ -99,10 +97,3 @@ def _write_draft(draft: Path, target: Path, data: bytes) -> None:
         os.fsync(file.fileno())
     if target.exists():
         shutil.copymode(target, draft)
-
-
-def save_figure(figure: Any, path: Path) -> None:
-    """Write a matplotlib figure in the format of the file's suffix; see :func:`write_files`."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format=path.suffix.removeprefix("."))
-    write_file(path, buffer.getvalue())

@@ -2,25 +2,37 @@
 
 from __future__ import annotations
 
+import base64
+import html
+import json
+import re
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.animation import FFMpegWriter, FuncAnimation
+from matplotlib.animation import FFMpegWriter
+from numpy.typing import NDArray
 from PIL import Image
 
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.drive import DriveResult, DriveSettings, drive
 from cbrrt_ompl.errors import InputError
-from cbrrt_ompl.figures import animation as module
-from cbrrt_ompl.figures.animation import animate, animate_drive, frame_times, save_animation
-from cbrrt_ompl.figures.figures import draw_drive
+from cbrrt_ompl.figures import draw_drive
+from cbrrt_ompl.figures import film as module
+from cbrrt_ompl.figures.animation import animate, animate_drive, save_animation
+from cbrrt_ompl.figures.film import frame_times
+from cbrrt_ompl.figures.player import player_page
+from cbrrt_ompl.figures.player_numbers import GAP, STEPS, plan_numbers
 from cbrrt_ompl.planning import plan
 from cbrrt_ompl.problem.obstacles import Bounds, Box
 from cbrrt_ompl.problem.robot import Footprint, Limits, Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.scenario.scenario import Scenario
 from cbrrt_ompl.trajectory.trajectory import Trajectory
+from cbrrt_ompl.trajectory.tree import Tree
 
 BOX = Box((4.0, 1.0), (4.4, 3.0))
 
@@ -49,12 +61,6 @@ def _few_frames(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "LONGEST", 2.0)
 
 
-def unsaved(animation: FuncAnimation) -> FuncAnimation:
-    """An animation that may be dropped without being saved: matplotlib warns of others."""
-    animation._draw_was_started = True
-    return animation
-
-
 def straight(duration: float) -> Trajectory:
     t = np.linspace(0.0, duration, 11)
     zero, one = np.zeros(11), np.full(11, 0.5)
@@ -78,6 +84,7 @@ def test_a_gif_has_every_frame_and_shows_motion(footprint: Footprint, tmp_path: 
     save_animation(animate(result.trajectory, scenario, result.tree), tmp_path / "plan.gif")
     with Image.open(tmp_path / "plan.gif") as image:
         moving = frame_times(result.trajectory)[:-3]
+        assert image.size == (1920, 1080)
         assert image.n_frames == len(moving) == 7, "the held ones are one with the last"
         pictures = []
         for frame in range(len(moving)):
@@ -89,7 +96,7 @@ def test_a_gif_has_every_frame_and_shows_motion(footprint: Footprint, tmp_path: 
 
 def test_an_animated_drive_shows_an_obstacle_once_it_is_seen(driven: DriveResult) -> None:
     seen_at = next(cycle.time for cycle in driven.cycles if cycle.seen)
-    animation = unsaved(animate_drive(driven))
+    animation = animate_drive(driven)
     show, times = animation._func, frame_times(driven.trajectory)
     plane = animation._fig.axes[0]
     seen, unseen = (next(c for c in plane.collections if c.get_label() == name) for name in ("found", "unknown"))
@@ -102,7 +109,7 @@ def test_an_animated_drive_shows_an_obstacle_once_it_is_seen(driven: DriveResult
 
 
 def test_an_animated_drive_shows_the_braking_that_is_ready(driven: DriveResult) -> None:
-    animation = unsaved(animate_drive(driven))
+    animation = animate_drive(driven)
     times = frame_times(driven.trajectory)
     line = next(line for line in animation._fig.axes[0].lines if line.get_label() == "braking, ready")
     for frame in (2, len(times) - 1):
@@ -114,17 +121,93 @@ def test_an_animated_drive_shows_the_braking_that_is_ready(driven: DriveResult) 
         assert not any(collides(a, b, 0.0) for a, b in zip(x.tolist(), y.tolist(), strict=True))
 
 
-def test_html_is_one_file_with_all_pictures(tmp_path: Path) -> None:
-    animation = animate(straight(1.0), hall(Footprint.disc(0.2)))
-    save_animation(animation, tmp_path / "plan.html")
-    text = (tmp_path / "plan.html").read_text(encoding="utf-8")
-    assert text.count("data:image/png;base64,") == 7
-    assert 'src="http' not in text
+def numbers_in(path: Path) -> dict[str, Any]:
+    """What a player draws, read back from its page."""
+    (text,) = re.findall(r'<script id="numbers" type="application/json">(.*?)</script>', path.read_text("utf-8"), re.S)
+    numbers: dict[str, Any] = json.loads(text)
+    return numbers
+
+
+def unpacked(text: str, bounds: list[float]) -> NDArray[np.float64]:
+    """Packed points in the world, shape (n, 2); gaps are NaN."""
+    whole = np.frombuffer(base64.b64decode(text), dtype="<u2").reshape(-1, 2).astype(float)
+    whole[whole == GAP] = np.nan
+    return np.array(bounds[:2]) + whole * max(bounds[2] - bounds[0], bounds[3] - bounds[1]) / STEPS
+
+
+class TestPlayer:
+    def test_it_holds_the_trajectory_the_scene_and_the_tree(self, tmp_path: Path) -> None:
+        scenario, trajectory = hall(Footprint.disc(0.2)), straight(1.0)
+        tree = Tree(np.zeros((2, 5)), np.array([-1, 0]), np.array([[0.8, 2.0], [1.0, 2.5], [np.nan, np.nan]]))
+        save_animation(animate(trajectory, scenario, tree), tmp_path / "plan.html")
+        found = numbers_in(tmp_path / "plan.html")
+        assert (found["name"], found["bounds"]) == ("hall", [0.0, 0.0, 8.0, 4.0])
+        for name in ("t", "x", "y", "theta", "v", "v_command"):
+            np.testing.assert_allclose(found["rows"][name], getattr(trajectory, name), atol=1e-3)
+        np.testing.assert_allclose(unpacked(found["boxes"], found["bounds"]), [(1.0, 3.5), (2.0, 4.0)], atol=1e-3)
+        np.testing.assert_allclose(unpacked(found["tree"], found["bounds"]), tree.polyline, atol=1e-3)
+        assert found["limits"]["omega"] == pytest.approx([-57.2958, 57.2958], abs=1e-3)
+        np.testing.assert_allclose(np.hypot(*np.array(found["robot"]).T), 0.2, atol=1e-5)
+
+    def test_it_needs_nothing_from_elsewhere_and_has_its_buttons(self, tmp_path: Path) -> None:
+        save_animation(animate(straight(1.0), hall(Footprint.point())), tmp_path / "plan.html")
+        text = (tmp_path / "plan.html").read_text(encoding="utf-8")
+        assert "http" not in text and "src=" not in text and "<link" not in text and "@import" not in text
+        assert re.findall(r'<button id="(\w+)"', text) == ["play", "fit", "theme"]
+        assert text.count("<canvas") == 1 and '<input id="time" type="range"' in text
+
+    def test_a_name_cannot_leave_its_place(self, tmp_path: Path) -> None:
+        scenario = replace(hall(Footprint.point()), name="</script><b>")
+        save_animation(animate(straight(1.0), scenario), tmp_path / "plan.html")
+        text = (tmp_path / "plan.html").read_text(encoding="utf-8")
+        assert "<b>" not in text and numbers_in(tmp_path / "plan.html")["name"] == "</script><b>"
+
+    def test_a_huge_tree_a_long_way_and_many_obstacles_stay_below_a_megabyte(self, tmp_path: Path) -> None:
+        rng = np.random.default_rng(1)
+        edges = np.dstack([rng.uniform(0.1, 7.9, (40_000, 11)), rng.uniform(0.1, 3.9, (40_000, 11))])
+        edges[:, -1] = np.nan
+        tree = Tree(np.zeros((1, 5)), np.array([-1]), edges.reshape(-1, 2))
+        corners = rng.uniform((0.0, 0.0), (7.9, 3.9), (20_000, 2))
+        boxes = [Box((x, y), (x + 0.01, y + 0.01)) for x, y in corners.tolist()]
+        scenario = hall(Footprint.disc(0.2))
+        crowded = SimpleNamespace(
+            name="crowded", world=World(scenario.world.bounds, boxes), robot=scenario.robot,
+            start=scenario.start, goal=scenario.goal,
+        )  # fmt: skip
+        t = np.linspace(0.0, 9.0, 20_000)
+        zero, one = np.zeros(20_000), np.full(20_000, 0.5)
+        numbers = plan_numbers(Trajectory(t, 0.8 + 0.5 * t, zero + 2.0, zero, one, zero, one, zero), crowded, tree)
+        assert len(player_page(numbers)) < 1_000_000
+        lines = unpacked(numbers["tree"], numbers["bounds"])
+        assert 10_000 < np.isnan(lines[:, 0]).sum() < 20_001
+        np.testing.assert_allclose(lines[0], edges[0, 0], atol=1e-3)
+
+    def test_a_drive_tells_when_what_was_seen_and_which_plan_was_followed(
+        self, driven: DriveResult, tmp_path: Path
+    ) -> None:
+        save_animation(animate_drive(driven), tmp_path / "drive.html")
+        drive = numbers_in(tmp_path / "drive.html")["drive"]
+        assert [index for seen in drive["seen"] for index in seen] == [0]
+        assert len(drive["looks"]) == len(drive["braking"]) == len(driven.cycles)
+        taken = [replan for replan in driven.replans if replan.trajectory is not None]
+        assert [plan["from"] for plan in drive["plans"]] == [replan.start_time for replan in taken]
+        np.testing.assert_allclose(drive["computing"], driven.computing_times, atol=1e-6)
+        for look, line in zip(drive["looks"], drive["braking"], strict=True):
+            np.testing.assert_allclose(line[0], driven.trajectory.at(look)[0, :2], atol=1e-3)
+
+    def test_a_notebook_shows_it_in_a_frame(self) -> None:
+        shown = animate(straight(1.0), hall(Footprint.point()))._repr_html_()
+        assert shown.startswith("<iframe") and html.unescape(shown).count("<!DOCTYPE html>") == 1
+
+
+def test_frames_are_1080p() -> None:
+    figure = animate(straight(1.0), hall(Footprint.point()))._fig
+    assert tuple(figure.bbox.size) == (1920.0, 1080.0)
 
 
 def test_mp4_without_ffmpeg_is_one_clear_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(FFMpegWriter, "isAvailable", classmethod(lambda cls: False))
-    animation = unsaved(animate(straight(1.0), hall(Footprint.disc(0.2))))
+    animation = animate(straight(1.0), hall(Footprint.disc(0.2)))
     with pytest.raises(InputError, match=r"suffix: got '\.mp4', expected ffmpeg on the path for MP4"):
         save_animation(animation, tmp_path / "plan.mp4")
 

@@ -31,7 +31,7 @@ from cbrrt_ompl import (
     verify,
 )
 from cbrrt_ompl.collision.world import Obstacle
-from cbrrt_ompl.figures.figures import draw_plan
+from cbrrt_ompl.figures import draw_plan
 from cbrrt_ompl.planners.registry import is_compiled
 from cbrrt_ompl.planning import available_planners
 from cbrrt_ompl.trajectory.replay import MAX_EDGE_POINTS

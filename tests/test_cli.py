@@ -13,11 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from cbrrt_ompl import __version__, planning
+from cbrrt_ompl import __version__, figures, planning
 from cbrrt_ompl.cli import build_parser, main, program
 from cbrrt_ompl.cli.output_files import SUFFIXES
 from cbrrt_ompl.errors import InputError, Problem
-from cbrrt_ompl.figures import figures
 from cbrrt_ompl.planners.registry import PLANNERS
 from cbrrt_ompl.reproduce import demo
 from cbrrt_ompl.scenario.scenario import load_scenario

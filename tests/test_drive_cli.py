@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from cbrrt_ompl.cli import main
-from cbrrt_ompl.figures import animation
+from cbrrt_ompl.figures import film
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 
 HALL = """
@@ -29,8 +29,8 @@ planning: {horizon: 1.5}
 @pytest.fixture
 def hall(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     """A scenario file; animations have a frame a second."""
-    monkeypatch.setattr(animation, "FRAMES_PER_SECOND", 1)
-    monkeypatch.setattr(animation, "LONGEST", 2.0)
+    monkeypatch.setattr(film, "FRAMES_PER_SECOND", 1)
+    monkeypatch.setattr(film, "LONGEST", 2.0)
     file = tmp_path / "hall.yaml"
     file.write_text(HALL)
     return str(file)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import io
 import math
+import re
 from collections.abc import Iterable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,10 +24,7 @@ from matplotlib.patches import Polygon as PolygonPatch
 from numpy.typing import NDArray
 
 from cbrrt_ompl.collision.world import World
-from cbrrt_ompl.figures.figures import (
-    PATH_COLOR,
-    TREE_COLOR,
-    TURN_COLOR,
+from cbrrt_ompl.figures import (
     draw_extension,
     draw_plan,
     draw_scene,
@@ -34,6 +33,8 @@ from cbrrt_ompl.figures.figures import (
     draw_velocities,
     draw_world,
 )
+from cbrrt_ompl.figures.saving import save_figure
+from cbrrt_ompl.figures.style import PATH_COLOR, TREE_COLOR, TURN_COLOR, time_text
 from cbrrt_ompl.motion.model import OPEN_LOOP, STEERING
 from cbrrt_ompl.planning import PlanResult
 from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, Obstacle, Polygon
@@ -70,10 +71,15 @@ def tree() -> Tree:
     return Tree(states, np.array([-1, 0, 0]), polyline)
 
 
-def scenario(obstacles: Iterable[Obstacle] = (), footprint: Footprint | None = None, **goal: Any) -> Scenario:
+def scenario(
+    obstacles: Iterable[Obstacle] = (),
+    footprint: Footprint | None = None,
+    corner: tuple[float, float] = (3.0, 2.0),
+    **goal: Any,
+) -> Scenario:
     return Scenario(
         name="corner",
-        world=World(Bounds((-1.0, -1.0), (3.0, 2.0)), obstacles),
+        world=World(Bounds((-1.0, -1.0), corner), obstacles),
         robot=Robot(footprint=Footprint.point() if footprint is None else footprint),
         start=State(0.0, 0.0, 0.3),
         goal=Goal(2.0, 1.5, 0.4, **goal),
@@ -256,10 +262,43 @@ def test_a_plan_shows_scene_tree_path_and_both_curves(tree: Tree, trajectory: Tr
     assert figure.get_suptitle() == "corner, cb-rrt\n1,228 nodes, 2,412 samples, 7.75 ms, 5.50 s of driving"
 
 
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (7.754e-3, "7.75 ms"),
+        (0.9996, "1 s"),
+        (0.9994, "999 ms"),
+        (1.2345, "1.23 s"),
+        (99.96, "100 s"),
+        (4321.0, "4,321 s"),
+    ],
+)
+def test_times_have_three_digits_and_never_an_exponent(seconds: float, text: str) -> None:
+    """A planning time of 1.2 s was told as 1.2e+03 ms."""
+    assert time_text(seconds) == text
+
+
+@pytest.mark.parametrize("corner", [(2.5, 2.5), (19.0, 2.0), (3.0, 9.0)], ids=["square", "wide", "tall"])
+def test_the_scene_is_the_largest_part_whatever_its_shape(
+    tree: Tree, trajectory: Trajectory, corner: tuple[float, float]
+) -> None:
+    figure = draw_plan(result(tree, trajectory), scenario(corner=corner))
+    figure.draw_without_rendering()
+    plane, *curves = (ax.get_position() for ax in figure.axes)
+    assert all(plane.width * plane.height > one.width * one.height for one in curves)
+    is_below = all(one.y1 < plane.y0 for one in curves)
+    assert is_below == (corner == (19.0, 2.0))
+    assert is_below or all(one.x0 > plane.x1 for one in curves)
+
+
 @pytest.mark.parametrize("solved", [False, True])
-def test_nothing_in_a_plan_is_clipped_or_on_top_of_the_data(tree: Tree, trajectory: Trajectory, solved: bool) -> None:
+@pytest.mark.parametrize("corner", [(2.5, 2.5), (19.0, 2.0), (3.0, 9.0)], ids=["square", "wide", "tall"])
+def test_nothing_in_a_plan_is_clipped_or_on_top_of_the_data(
+    tree: Tree, trajectory: Trajectory, solved: bool, corner: tuple[float, float]
+) -> None:
     long_name = replace(
-        scenario(footprint=SQUARE), name="a scene with a name far too long for one line, costing 5 $ or 6 $"
+        scenario(footprint=SQUARE, corner=corner),
+        name="a scene with a name far too long for one line, costing 5 $ or 6 $",
     )
     figure = draw_plan(result(tree, trajectory if solved else None), long_name)
     figure.draw_without_rendering()
@@ -279,6 +318,16 @@ def test_a_plan_that_failed_shows_its_tree_and_its_status(tree: Tree) -> None:
     (plane,) = figure.axes
     assert labels(plane) == {"obstacle", "start", "goal", "node", "edge"}
     assert figure.get_suptitle() == "corner, cb-rrt\n1,228 nodes, 2,412 samples, 7.75 ms, sample limit"
+
+
+def test_a_pdf_embeds_its_fonts_as_true_type(tree: Tree, trajectory: Trajectory, tmp_path: Path) -> None:
+    """Publishers refuse Type 3, which is what matplotlib embeds if nobody says otherwise."""
+    save_figure(draw_plan(result(tree, trajectory), scenario()), tmp_path / "plan.PDF")
+    content = (tmp_path / "plan.PDF").read_bytes()
+    assert content.startswith(b"%PDF")
+    assert b"/FontFile2" in content
+    assert re.search(rb"/Subtype\s*/CIDFontType2", content)
+    assert not re.search(rb"/Subtype\s*/Type3", content)
 
 
 def test_figures_leave_no_trace_in_pyplot(tree: Tree, trajectory: Trajectory) -> None:

@@ -32,7 +32,8 @@ from cbrrt_ompl import (
 )
 from cbrrt_ompl.benchmark.report import _write_csv
 from cbrrt_ompl.cli import main
-from cbrrt_ompl.files import as_path, save_figure, write_file, write_files
+from cbrrt_ompl.figures.saving import save_figure
+from cbrrt_ompl.files import as_path, write_file, write_files
 
 WORLD = World(Bounds((0.0, 0.0), (2.0, 2.0)), [Box((0.9, 0.0), (1.1, 1.0))])
 SCENARIO = Scenario(name="small", world=WORLD, start=State(0.5, 0.5), goal=Goal(1.5, 0.5, tolerance=0.3))

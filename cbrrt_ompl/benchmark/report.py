@@ -26,7 +26,8 @@ from cbrrt_ompl.benchmark.statistics import (
     wilson_interval,
 )
 from cbrrt_ompl.errors import UnknownPlannerError
-from cbrrt_ompl.files import save_figure, write_file
+from cbrrt_ompl.figures.saving import save_figure
+from cbrrt_ompl.files import write_file
 
 SUMMARY_COLUMNS = (
     "scenario", "planner", "runs", "successes", "success_rate", "success_low", "success_high", "invalid", "crashed",

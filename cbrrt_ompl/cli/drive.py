@@ -80,8 +80,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.trajectory is not None:
         result.trajectory.save(arguments.trajectory)
     if arguments.figure is not None:
-        from cbrrt_ompl.figures.figures import draw_drive
-        from cbrrt_ompl.files import save_figure
+        from cbrrt_ompl.figures import draw_drive
+        from cbrrt_ompl.figures.saving import save_figure
 
         save_figure(draw_drive(result), arguments.figure)
     if arguments.animation is not None:

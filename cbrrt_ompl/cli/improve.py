@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
         better.save(arguments.output)
     if arguments.figure is not None:
         from cbrrt_ompl.figures.improvement import draw_improvement
-        from cbrrt_ompl.files import save_figure
+        from cbrrt_ompl.figures.saving import save_figure
 
         save_figure(draw_improvement(given, better, history, scenario), arguments.figure)
     data = {

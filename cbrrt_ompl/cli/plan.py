@@ -65,8 +65,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.trajectory is not None and trajectory is not None:
         trajectory.save(arguments.trajectory)
     if arguments.figure is not None:
-        from cbrrt_ompl.figures.figures import draw_plan
-        from cbrrt_ompl.files import save_figure
+        from cbrrt_ompl.figures import draw_plan
+        from cbrrt_ompl.figures.saving import save_figure
 
         save_figure(draw_plan(result, scenario), arguments.figure)
     if arguments.animation is not None and trajectory is not None:

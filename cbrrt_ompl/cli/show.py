@@ -36,9 +36,10 @@ def run(arguments: argparse.Namespace) -> int:
     check_backend()
     from matplotlib.figure import Figure
 
-    from cbrrt_ompl.figures.figures import draw_trajectory, legend_above
-    from cbrrt_ompl.figures.maps import draw_draft, draw_map, figure_size
-    from cbrrt_ompl.files import save_figure
+    from cbrrt_ompl.figures import draw_draft, draw_map, draw_trajectory
+    from cbrrt_ompl.figures.layout import DPI, plane_size
+    from cbrrt_ompl.figures.saving import save_figure
+    from cbrrt_ompl.figures.style import legend_above
     from cbrrt_ompl.scenario.maps.loading import load_map
 
     trajectory = None if arguments.trajectory is None else load_trajectory(arguments)
@@ -47,7 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
     print_remarks(grid)
     bounds = draft.world.bounds if draft is not None else grid.bounds() if grid is not None else None
     assert bounds is not None
-    size: dict[str, Any] = {"figsize": figure_size(bounds), "layout": "constrained", "dpi": 150}
+    size: dict[str, Any] = {"figsize": plane_size(bounds), "layout": "constrained", "dpi": DPI}
     figure = Figure(**size) if arguments.figure is not None else _window(**size)
     ax = figure.subplots()
     if draft is not None:

@@ -9,7 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cbrrt_ompl.figures.figures import COMMAND_COLOR, PATH_COLOR, draw_scene, draw_trajectory, legend_above
+from cbrrt_ompl.figures.layout import plane_and_curves
+from cbrrt_ompl.figures.scene import draw_scene
+from cbrrt_ompl.figures.style import COMMAND_COLOR, PATH_COLOR, legend_above, shrink_labels, time_text
+from cbrrt_ompl.figures.trajectory import draw_trajectory
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -18,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def draw_improvement(given: Trajectory, better: Trajectory, history: Sequence[Found], scenario: Scenario) -> Figure:
-    """Draw a trajectory before and after its improvement beside the history of it.
+    """Draw a trajectory before and after its improvement with the history of it beside or below.
 
     Args:
         given: the trajectory before.
@@ -29,14 +32,19 @@ def draw_improvement(given: Trajectory, better: Trajectory, history: Sequence[Fo
     Returns:
         A new figure.
     """
-    figure = Figure(figsize=(11.0, 5.0), layout="constrained")
-    plane, times = figure.subplots(1, 2, width_ratios=(1.4, 1.0))
+    figure, plane, (times,), _ = plane_and_curves(scenario.world.bounds, 1)
     draw_scene(plane, scenario)
     plane.plot(given.x, given.y, color=COMMAND_COLOR, linestyle="--", linewidth=1.2, zorder=2.5, label="before")
     draw_trajectory(plane, better, scenario.robot.footprint)
     legend_above(plane)
     draw_history(times, history)
-    times.set_title(f"{given.duration:.2f} s before, {better.duration:.2f} s after", fontsize=10)
+    figure.suptitle(
+        f"{scenario.name}\n{given.duration:.2f} s before, {better.duration:.2f} s after, "
+        f"found after {time_text(history[-1].time if history else 0.0)}",
+        fontsize=9,
+        parse_math=False,
+    )
+    shrink_labels(figure)
     return figure
 
 
@@ -55,8 +63,8 @@ def draw_history(ax: Axes, history: Sequence[Found]) -> Axes:
     for time, row in zip(times, history, strict=True):
         ax.annotate(row.source, (time, row.duration), xytext=(5.0, 5.0), textcoords="offset points", fontsize=7)
     ax.set_xlabel("time [ms]")
-    ax.set_ylabel("duration of the trajectory [s]")
-    ax.set_ylim(bottom=0.0)
-    ax.margins(x=0.45)
+    ax.set_ylabel("duration [s]")
+    ax.set_ylim(0.0, 1.25 * max(durations, default=1.0))
+    ax.set_xlim(0.0, 1.45 * max(times, default=1.0))
     ax.grid(alpha=0.3)
     return ax

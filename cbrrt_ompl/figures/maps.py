@@ -13,7 +13,8 @@ from matplotlib.ticker import FixedLocator, MultipleLocator
 from matplotlib.transforms import Affine2D
 
 from cbrrt_ompl.collision.occupancy import FREE, OCCUPIED, UNKNOWN
-from cbrrt_ompl.figures.figures import OBSTACLE_COLOR, draw_goal, draw_start, draw_world
+from cbrrt_ompl.figures.scene import draw_goal, draw_start, draw_world
+from cbrrt_ompl.figures.style import OBSTACLE_COLOR
 from cbrrt_ompl.problem.obstacles import Bounds
 
 if TYPE_CHECKING:
@@ -28,9 +29,6 @@ WRONG_COLOR = "#CC0000"
 
 MOST_LABELS, MOST_TICKS = 12, 120
 """On an axis, before labels stand several metres apart, and ticks as well."""
-
-WIDEST, TALLEST = 9.0, 9.0
-"""Largest size of a figure [inch]."""
 
 
 def draw_map(ax: Axes, grid: OccupancyMap, unit: str = "m") -> Axes:
@@ -80,13 +78,6 @@ def draw_draft(ax: Axes, draft: Draft, grid: OccupancyMap | None = None) -> Axes
         low, high = np.minimum(low, near), np.maximum(high, near)
     _show(ax, low, high)
     return ax
-
-
-def figure_size(bounds: Bounds) -> tuple[float, float]:
-    """Width and height of a figure of about the shape of a plane [inch]."""
-    width, height = bounds.size
-    scale = min((WIDEST - 0.8) / width, (TALLEST - 1.2) / height)
-    return max(scale * width + 0.8, 4.0), max(scale * height + 1.2, 3.0)
 
 
 def _set_plane(ax: Axes, bounds: Bounds, unit: str) -> None:

@@ -15,7 +15,8 @@ from matplotlib.legend_handler import HandlerPolyCollection
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from cbrrt_ompl.benchmark.charts import COLORS
-from cbrrt_ompl.figures.figures import draw_scene, draw_trajectory, draw_tree, draw_velocities
+from cbrrt_ompl.figures import draw_scene, draw_trajectory, draw_tree, draw_velocities
+from cbrrt_ompl.figures.style import legend_above
 from cbrrt_ompl.planning import PlanResult, plan
 from cbrrt_ompl.reproduce.claims import QueryCosts
 from cbrrt_ompl.reproduce.grids import GridPath
@@ -126,7 +127,7 @@ def nodes_figure(outcomes: Outcomes) -> Figure:
     ax.grid(axis="x", color="0.9", linewidth=0.6)
     ax.set_axisbelow(True)
     _plain_ticks(ax)
-    ax.legend(loc="lower left", fontsize=8)
+    legend_above(ax)
     return figure
 
 
@@ -164,7 +165,7 @@ def shifts_figure(outcomes: Outcomes, shifts: Sequence[float]) -> Figure:
         ax.set_ylabel("nodes, median and 95 % interval")
         ax.grid(color="0.9", linewidth=0.6)
         ax.set_axisbelow(True)
-        ax.legend(fontsize=8)
+        legend_above(ax)
     return figure
 
 
@@ -186,7 +187,7 @@ def neighbours_figure(costs: QueryCosts) -> Figure:
     ax.set_ylabel("time of a query [ns]")
     ax.grid(color="0.9", linewidth=0.6)
     ax.set_axisbelow(True)
-    ax.legend(fontsize=8)
+    legend_above(ax)
     return figure
 
 

@@ -10,8 +10,9 @@ from typing import TypeAlias
 
 from matplotlib.figure import Figure
 
-from cbrrt_ompl.figures.figures import draw_plan, draw_velocities
-from cbrrt_ompl.files import save_figure, write_file
+from cbrrt_ompl.figures import draw_plan, draw_velocities
+from cbrrt_ompl.figures.saving import save_figure
+from cbrrt_ompl.files import write_file
 from cbrrt_ompl.ompl_plugin.availability import has_ompl
 from cbrrt_ompl.planning import PlanResult, plan
 from cbrrt_ompl.reproduce.published import PAPER, Published
