@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import os
+import re
 from pathlib import Path
 
 import pytest
@@ -55,3 +57,22 @@ def test_caches_elsewhere_are_looked_through_too(
 
 def test_a_folder_that_is_not_there_is_no_error(tmp_path: Path) -> None:
     drop_stale_kernels(tmp_path / "missing" / "package.zip")
+
+
+def test_only_kernels_call_a_kernel_without_a_way_in_from_python(repository: Path) -> None:
+    """`candidate` had none, and a figure of an extension called it: the process died of a segmentation fault."""
+    trees = {path: ast.parse(path.read_text(encoding="utf-8")) for path in (repository / "cbrrt_ompl").rglob("*.py")}
+    functions = [
+        (path, node) for path, tree in trees.items() for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)
+    ]
+    marks = {id(node): " ".join(map(ast.unparse, node.decorator_list)) for _, node in functions}
+    inner = {node.name for _, node in functions if "inner_kernel" in marks[id(node)]}
+    assert inner
+    wrong = [
+        f"{path.name}: {node.name} calls {call.func.id}"
+        for path, node in functions
+        if not re.search("kernel|njit|jitable|overload|cfunc", marks[id(node)])
+        for call in ast.walk(node)
+        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id in inner
+    ]
+    assert wrong == []

@@ -180,7 +180,7 @@ def advance(
     return x, y, theta, v, omega, command[0], command[1]
 
 
-@inner_kernel
+@kernel
 def candidate(
     index: int,
     node: tuple[float, float, float, float, float],
@@ -226,7 +226,7 @@ def manoeuvre_command(
     )
 
 
-@inner_kernel
+@kernel
 def manoeuvre_has_ended(manoeuvre: float, state: tuple[float, float, float, float, float], goal: Record) -> bool:
     """Whether a manoeuvre is over, see :func:`cbrrt_ompl.motion.manoeuvres.has_ended`."""
     return has_ended(manoeuvre, state, (goal.x, goal.y, goal.theta), goal.heading_tolerance < math.inf)
