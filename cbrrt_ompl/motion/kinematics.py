@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.kernels import inner_kernel, kernel
+from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.problem.robot import Limits
 
 
@@ -133,7 +133,7 @@ def stopping_time(v: float, omega: float, limits: Limits) -> float:
     return joint_ramp_time(v, omega, limits) if has_wheel_limits(limits) else abs(v) / limits.acceleration
 
 
-@inner_kernel
+@kernel
 def stopping_time_of_turn(v: float, omega: float, limits: Limits) -> float:
     """Time in which a robot that brakes no longer turns, though it may still drive [s]."""
     return joint_ramp_time(v, omega, limits) if has_wheel_limits(limits) else abs(omega) / limits.angular_acceleration

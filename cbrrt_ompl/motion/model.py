@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from cbrrt_ompl.errors import Problem, SettingsError
-from cbrrt_ompl.kernels import inner_kernel, kernel
+from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.motion.control_laws import steering_rate, tracking_command
 from cbrrt_ompl.motion.kinematics import dynamic_step, kinematic_step, saturate
 from cbrrt_ompl.motion.laws import GAINS, LIMITS, law_address
@@ -207,7 +207,7 @@ def candidate(
     return v, omega, (v, omega, 0.0)
 
 
-@inner_kernel
+@kernel
 def manoeuvre_command(
     state: tuple[float, float, float, float, float], manoeuvre: float, model: Record
 ) -> tuple[float, float]:

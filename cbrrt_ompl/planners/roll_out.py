@@ -265,7 +265,7 @@ def roll_out_brake_safe(
     return driven, outcome, end
 
 
-@inner_kernel
+@kernel
 def can_brake(
     state: tuple[float, float, float, float, float],
     margin: float,
