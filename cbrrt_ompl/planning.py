@@ -28,6 +28,7 @@ from cbrrt_ompl.problem.robot import Footprint
 from cbrrt_ompl.problem.settings import Goal
 from cbrrt_ompl.scenario.connectivity import has_no_way
 from cbrrt_ompl.scenario.scenario import Scenario, check_scenario
+from cbrrt_ompl.shown import Shown
 from cbrrt_ompl.trajectory.replay import trajectory_from_controls
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.trajectory.tree import Tree
@@ -54,7 +55,7 @@ Progress = Callable[[int, float], None]
 
 
 @dataclass(frozen=True, eq=False)
-class PlanResult:
+class PlanResult(Shown):
     """What came of a plan."""
 
     planner: str
@@ -75,6 +76,14 @@ class PlanResult:
     """Makes the tree out of the planner's memory."""
     history: tuple[Found, ...] = ()
     """When which trajectory was found, each better than the one before: rows of (time [s], duration [s], source)."""
+    scenario: Scenario | None = None
+    """What it was planned for; None where nobody said."""
+
+    def __repr__(self) -> str:
+        """Planner, status, what it took, and the trajectory."""
+        found = "" if self.trajectory is None else f", {self.trajectory!r}"
+        took = f"{self.samples:,} samples, {1e3 * self.planning_time:.2f} ms"
+        return f"PlanResult({self.planner}, {self.status}, {took}{found})"
 
     @property
     def solved(self) -> bool:
@@ -137,6 +146,7 @@ def plan(
         KeyboardInterrupt: on Ctrl-C, at once.
     """
     check_scenario(scenario)
+    asked = scenario
     is_anytime = planner_named(planner).is_anytime
     _check_arguments(seed, time_limit, progress)
     check_improvement(improve_for, max_iterations, objective, callback, should_stop, name="improve_for")
@@ -152,7 +162,7 @@ def plan(
     if scenario.planning.approaches(scenario.goal):
         scenario = replace(scenario, goal=approachable_goal(scenario))
     if not improves:
-        return _first_plan(scenario, planner, seed, watch)
+        return replace(_first_plan(scenario, planner, seed, watch), scenario=asked)
     if is_anytime and improve_for is None and max_iterations is None:
         max_iterations = ANYTIME_ITERATIONS
     improver = Improver(
@@ -166,12 +176,12 @@ def plan(
     )
     budget = math.inf if improve_for is None else improve_for
     if is_anytime:
-        return _plan_anytime(scenario, planner, seed, watch, improver, budget)
+        return replace(_plan_anytime(scenario, planner, seed, watch, improver, budget), scenario=asked)
     result = _first_plan(scenario, planner, seed, watch)
     if result.trajectory is not None:
         improver.begin(budget, watch.began)
         improver.improve(result.trajectory, planner)
-    return _with_best(result, improver)
+    return replace(_with_best(result, improver), scenario=asked)
 
 
 def _first_plan(scenario: Scenario, planner: str, seed: int | None, watch: _Watch) -> PlanResult:
@@ -326,7 +336,7 @@ def _already_there(scenario: Scenario, planner: str, seed: int | None) -> PlanRe
     start = np.array([scenario.start], dtype=float)
     stay = trajectory_from_controls(start[0], np.empty((0, 3)), np.empty(0, dtype=np.int64), model)
     tree = Tree(start, np.array([-1]), np.empty((0, 2)))
-    return PlanResult(planner, seed, SOLVED, stay, partial(_given, 1), 0, 0.0, partial(_given, tree))
+    return PlanResult(planner, seed, SOLVED, stay, partial(_given, 1), 0, 0.0, partial(_given, tree), scenario=scenario)
 
 
 def _given(value: T) -> T:

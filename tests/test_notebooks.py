@@ -17,11 +17,21 @@ FIGURES = {
     "3_own_map_and_robot": 5,
     "4_benchmark": 2,
     "5_half_known_world": 3,
+    "6_improving": 4,
 }
 """Pictures that a notebook shows at least; those of sliders are theirs and not counted."""
 
 IN_OMPL = ("1_first_plan", "4_benchmark")
 """Those that plan with OMPL."""
+
+
+LARGEST = 2_000_000
+"""Size of a notebook that has run [bytes]."""
+
+
+def is_log_line(line: str) -> bool:
+    """Whether OMPL has written a line, as in ``Info:    No planner specified. Using default.``."""
+    return line.startswith(("Info:", "Debug:", "Warning:", "Error:"))
 
 
 def read(name: str) -> Any:
@@ -63,3 +73,8 @@ def test_a_notebook_runs_from_top_to_bottom(
     outputs = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
     assert sum("image/png" in output.get("data", {}) for output in outputs) >= FIGURES[name]
     assert not [output.text for output in outputs if output.get("name") == "stderr"]
+    assert not [
+        text for output in outputs if (text := output.get("data", {}).get("text/plain", "")).startswith("<Axes")
+    ]
+    assert not [line for output in outputs for line in output.get("text", "").splitlines() if is_log_line(line)]
+    assert len(nbformat.writes(notebook)) < LARGEST

@@ -25,12 +25,13 @@ from cbrrt_ompl.collision.scene import Scene, make_scene
 from cbrrt_ompl.errors import MISSING, Problem, WorldError
 from cbrrt_ompl.problem.obstacles import Bounds, Obstacle, polygons_from_shapely
 from cbrrt_ompl.problem.robot import Footprint
+from cbrrt_ompl.shown import Shown
 
 CONTACT_BAND = (MITRE_LIMIT + 1.0) * CONTACT_TOLERANCE
 """Clearance below which FCL decides whether a pose is free: what it grows corners by, and some rounding [m]."""
 
 
-class World:
+class World(Shown):
     """Bounds and obstacles, ready for collision queries from any thread.
 
     Distances are exact, by compiled code in the plane; whether a pose within some micrometres of contact is free is
@@ -262,6 +263,11 @@ class World:
             referees[footprint] = FclReferee(self.bounds, self._solids, footprint)
         return referees[footprint]
 
+    def __repr__(self) -> str:
+        """Its size and how much stands in it."""
+        width, height = self.bounds.size
+        return f"World({width:.4g} x {height:.4g} m, {_count(len(self.obstacles), 'obstacle')})"
+
     def __reduce__(self) -> tuple[Any, ...]:
         """What is pickled: all else is made again from bounds, grid and obstacles."""
         if self.layer is None:
@@ -278,6 +284,11 @@ class _Referees(threading.local):
 
     def __init__(self) -> None:
         self.by_footprint: dict[Footprint, FclReferee] = {}
+
+
+def _count(number: int, name: str) -> str:
+    """So many things, in words."""
+    return f"{number:,} {name}{'' if number == 1 else 's'}"
 
 
 def _checked_obstacles(obstacles: Iterable[Obstacle]) -> tuple[Obstacle, ...]:

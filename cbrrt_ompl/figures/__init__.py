@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from cbrrt_ompl.figures.drive import draw_computing_times, draw_drive, draw_unknown
+from cbrrt_ompl.figures.explorer import explore
 from cbrrt_ompl.figures.extension import draw_extension
 from cbrrt_ompl.figures.improvement import draw_history, draw_improvement
 from cbrrt_ompl.figures.maps import draw_draft, draw_map
@@ -27,4 +28,5 @@ __all__ = [
     "draw_unknown",
     "draw_velocities",
     "draw_world",
+    "explore",
 ]

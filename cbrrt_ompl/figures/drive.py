@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
-from matplotlib.figure import Figure
 
-from cbrrt_ompl.figures.layout import plane_and_curves
+from cbrrt_ompl.figures.layout import ShownFigure, plane_and_curves
 from cbrrt_ompl.figures.scene import draw_scene, obstacle_path
 from cbrrt_ompl.figures.style import COMMAND_COLOR, PATH_COLOR, TREE_COLOR, legend_above
 from cbrrt_ompl.figures.trajectory import draw_trajectory
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
     from cbrrt_ompl.drive.result import DriveResult
 
 
-def draw_drive(result: DriveResult) -> Figure:
+def draw_drive(result: DriveResult) -> ShownFigure:
     """Draw what came of a drive: the world, what was found, the way and the places of the plans, and three curves.
 
     Args:

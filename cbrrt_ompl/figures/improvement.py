@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from cbrrt_ompl.figures.layout import plane_and_curves
+from cbrrt_ompl.figures.layout import ShownFigure, plane_and_curves
 from cbrrt_ompl.figures.scene import draw_scene
 from cbrrt_ompl.figures.style import COMMAND_COLOR, PATH_COLOR, legend_above, shrink_labels, time_text
 from cbrrt_ompl.figures.trajectory import draw_trajectory
@@ -20,7 +19,9 @@ if TYPE_CHECKING:
     from cbrrt_ompl.scenario.scenario import Scenario
 
 
-def draw_improvement(given: Trajectory, better: Trajectory, history: Sequence[Found], scenario: Scenario) -> Figure:
+def draw_improvement(
+    given: Trajectory, better: Trajectory, history: Sequence[Found], scenario: Scenario
+) -> ShownFigure:
     """Draw a trajectory before and after its improvement with the history of it beside or below.
 
     Args:

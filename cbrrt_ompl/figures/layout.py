@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from typing import NamedTuple
 
 from matplotlib.axes import Axes
@@ -32,16 +33,30 @@ CURVE_HEIGHT = 1.2
 """Height of each of several curves beside the plane, at least [inch]."""
 
 
+NOTEBOOK_DPI = 90
+"""Pixels an inch in a notebook: with ten pictures it stays below two megabytes."""
+
+
+class ShownFigure(Figure):
+    """A figure that a notebook shows whether pyplot is set up for it or not."""
+
+    def _repr_png_(self) -> bytes:
+        """The figure as PNG."""
+        buffer = io.BytesIO()
+        self.savefig(buffer, format="png", dpi=NOTEBOOK_DPI)
+        return buffer.getvalue()
+
+
 class Panels(NamedTuple):
     """A figure of a plane and curves over time."""
 
-    figure: Figure
+    figure: ShownFigure
     plane: Axes
     curves: list[Axes]
     is_beside: bool
     """Whether the curves stand beside the plane, and not below it."""
 
-    def finish(self) -> Figure:
+    def finish(self) -> ShownFigure:
         """Once all is drawn: times labelled once a column, legends above, small labels."""
         for ax in self.curves:
             is_labelled = not self.is_beside or ax is self.curves[-1]
@@ -74,7 +89,7 @@ def plane_and_curves(bounds: Bounds, count: int, size: tuple[float, float] | Non
     if size is None:
         wide = max(beside * width + LABELS + CURVES_WIDTH, NARROWEST) if is_beside else wide
         tall = HEADER + (max(beside * height, CURVE_HEIGHT * count) if is_beside else below * height + CURVES_HEIGHT)
-    figure = Figure(figsize=(wide, tall), layout="constrained", dpi=DPI)
+    figure = ShownFigure(figsize=(wide, tall), layout="constrained", dpi=DPI)
     if is_beside:
         taken = beside * width + LABELS
         grid = figure.add_gridspec(count, 2, width_ratios=(taken, wide - taken))
@@ -84,6 +99,12 @@ def plane_and_curves(bounds: Bounds, count: int, size: tuple[float, float] | Non
         plane, cells = figure.add_subplot(grid[0, :]), [grid[1, column] for column in range(count)]
     first = figure.add_subplot(cells[0])
     return Panels(figure, plane, [first, *(figure.add_subplot(cell, sharex=first) for cell in cells[1:])], is_beside)
+
+
+def plane_alone(bounds: Bounds) -> tuple[ShownFigure, Axes]:
+    """A figure of a plane and nothing else."""
+    figure = ShownFigure(figsize=plane_size(bounds), layout="constrained", dpi=DPI)
+    return figure, figure.add_subplot()
 
 
 def plane_size(bounds: Bounds) -> tuple[float, float]:

@@ -5,9 +5,7 @@ from __future__ import annotations
 import textwrap
 from typing import TYPE_CHECKING
 
-from matplotlib.figure import Figure
-
-from cbrrt_ompl.figures.layout import DPI, plane_and_curves, plane_size
+from cbrrt_ompl.figures.layout import ShownFigure, plane_alone, plane_and_curves
 from cbrrt_ompl.figures.scene import draw_scene
 from cbrrt_ompl.figures.style import legend_above, shrink_labels, time_text
 from cbrrt_ompl.figures.trajectory import draw_trajectory
@@ -19,7 +17,7 @@ if TYPE_CHECKING:
     from cbrrt_ompl.scenario.scenario import Scenario
 
 
-def draw_plan(result: PlanResult, scenario: Scenario) -> Figure:
+def draw_plan(result: PlanResult, scenario: Scenario) -> ShownFigure:
     """Draw what a planner found: scene, tree and path, the two velocity curves beside or below them.
 
     Args:
@@ -31,8 +29,7 @@ def draw_plan(result: PlanResult, scenario: Scenario) -> Figure:
     """
     trajectory, bounds = result.trajectory, scenario.world.bounds
     if trajectory is None:
-        figure = Figure(figsize=plane_size(bounds), layout="constrained", dpi=DPI)
-        plane = figure.add_subplot()
+        figure, plane = plane_alone(bounds)
     else:
         panels = plane_and_curves(bounds, 2)
         figure, plane = panels.figure, panels.plane

@@ -7,52 +7,38 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
 from cbrrt_ompl.figures.style import COMMAND_COLOR, PATH_COLOR, TURN_COLOR
 from cbrrt_ompl.problem.robot import Limits
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 
 
-def draw_velocities(axes: Sequence[Axes], trajectory: Trajectory, limits: Limits) -> Sequence[Axes]:
+def draw_velocities(axes: Sequence[Axes], trajectory: Trajectory, limits: Limits | None) -> Sequence[Axes]:
     """Draw both velocities over time with their commands and limits, a dot every second, as in the paper's Fig. 6.
 
     Args:
         axes: axes for v [m/s] and for omega [deg/s].
         trajectory: what is drawn.
-        limits: the ranges, drawn as dashed lines.
+        limits: the ranges, drawn as dashed lines; None where they are not known.
 
     Returns:
         The axes.
     """
     seconds = trajectory.t[0] + np.arange(math.floor(trajectory.duration) + 1)
     dots = trajectory.at(np.minimum(seconds, trajectory.t[-1]))
-    degrees = math.degrees(1.0)
-    for ax, values, commands, at_seconds, low, high, label in (
-        (axes[0], trajectory.v, trajectory.v_command, dots[:, 3], limits.v_min, limits.v_max, "v [m/s]"),
-        (
-            axes[1],
-            degrees * trajectory.omega,
-            degrees * trajectory.omega_command,
-            degrees * dots[:, 4],
-            degrees * limits.omega_min,
-            degrees * limits.omega_max,
-            r"$\omega$ [deg/s]",
-        ),
+    for ax, name, column, unit, label in (
+        (axes[0], "v", 3, 1.0, "v [m/s]"),
+        (axes[1], "omega", 4, math.degrees(1.0), r"$\omega$ [deg/s]"),
     ):
-        for limit in (low, high):
-            ax.axhline(limit, color="black", linestyle="--", linewidth=0.9, label="limit" if limit == high else None)
-        ax.plot(trajectory.t, commands, color=COMMAND_COLOR, linewidth=0.7, drawstyle="steps-post", label="command")
-        ax.plot(
-            trajectory.t,
-            values,
-            color=PATH_COLOR,
-            linewidth=1.5,
-            drawstyle="steps-pre" if trajectory.kinematic else "default",
-            label="velocity",
-        )
+        values, commands = unit * getattr(trajectory, name), unit * getattr(trajectory, f"{name}_command")
+        ends = () if limits is None else tuple(unit * getattr(limits, f"{name}_{end}") for end in ("min", "max"))
+        for limit in ends:
+            ax.axhline(limit, color="black", linestyle="--", linewidth=0.9, label="limit" if limit == ends[1] else None)
+        _draw_curve(ax, trajectory, values, commands)
         ax.plot(
             seconds,
-            at_seconds,
+            unit * dots[:, column],
             linestyle="none",
             marker="o",
             markersize=3.2,
@@ -60,14 +46,19 @@ def draw_velocities(axes: Sequence[Axes], trajectory: Trajectory, limits: Limits
             markeredgewidth=0.0,
             label="every second",
         )
-        margin = 0.12 * (high - low)
-        ax.set_ylim(
-            min(low, values.min(), commands.min()) - margin,
-            max(high, values.max(), commands.max()) + margin,
-        )
+        shown = np.array([*ends, values.min(), commands.min(), values.max(), commands.max()])
+        margin = 0.12 * float(np.ptp(ends or shown)) or 0.1
+        ax.set_ylim(shown.min() - margin, shown.max() + margin)
         ax.set_xlim(trajectory.t[0], max(float(trajectory.t[-1]), float(trajectory.t[0]) + 1e-3))
         ax.set_ylabel(label)
         ax.grid(True, linewidth=0.4, color="0.88")
         ax.set_axisbelow(True)
     axes[1].set_xlabel("t [s]")
     return axes
+
+
+def _draw_curve(ax: Axes, trajectory: Trajectory, values: NDArray[np.float64], commands: NDArray[np.float64]) -> None:
+    """One velocity and its commands."""
+    ax.plot(trajectory.t, commands, color=COMMAND_COLOR, linewidth=0.7, drawstyle="steps-post", label="command")
+    style = "steps-pre" if trajectory.kinematic else "default"
+    ax.plot(trajectory.t, values, color=PATH_COLOR, linewidth=1.5, drawstyle=style, label="velocity")

@@ -18,13 +18,14 @@ from cbrrt_ompl.scenario.scenario_file import read_parts, scenario_data
 from cbrrt_ompl.scenario.sections import Report
 from cbrrt_ompl.scenario.sources import Source, read_source
 from cbrrt_ompl.scenario.why_not import why_not
+from cbrrt_ompl.shown import Shown
 
 HORIZON_TOLERANCE = 0.01
 """Share of the horizon that rounding it to whole steps may add or take away."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Scenario:
+class Scenario(Shown):
     """What to plan: the paper's robot and settings unless others are given.
 
     Raises:
@@ -59,6 +60,12 @@ class Scenario:
         if not isinstance(other, Scenario):
             return NotImplemented
         return self._key() == other._key()
+
+    def __repr__(self) -> str:
+        """Name, world, and from where to where."""
+        start, goal = self.start, self.goal
+        way = f"({start.x:.4g}, {start.y:.4g}) to ({goal.x:.4g}, {goal.y:.4g})"
+        return f"Scenario({self.name!r}, {self.world!r}, {way})"
 
     def __hash__(self) -> int:
         """Hash of all parts."""

@@ -19,6 +19,7 @@ from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.errors import MISSING, Problem, TrajectoryError
 from cbrrt_ompl.files import as_path, write_file
 from cbrrt_ompl.problem.settings import MAX_STEPS
+from cbrrt_ompl.shown import Shown
 
 if TYPE_CHECKING:
     from cbrrt_ompl.problem.robot import Limits
@@ -60,7 +61,7 @@ class PointTurn(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class Trajectory(Shown):
     """States and commands over time.
 
     Row k is the state at ``t[k]``; its command acts from ``t[k]`` to ``t[k + 1]``; the last row repeats the command
@@ -107,6 +108,11 @@ class Trajectory:
             array.setflags(write=False)
             object.__setattr__(self, name, array)
         object.__setattr__(self, "kinematic", bool(self.kinematic))
+
+    def __repr__(self) -> str:
+        """Duration, length and rows."""
+        kind = ", kinematic" if self.kinematic else ""
+        return f"Trajectory({self.duration:.2f} s, {self.length:.2f} m, {len(self):,} rows{kind})"
 
     def __len__(self) -> int:
         """Number of rows."""
