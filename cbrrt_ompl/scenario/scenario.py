@@ -292,6 +292,8 @@ def _goal_problems(goal: Goal, world: World, robot: Robot | None, source: MapSou
 
 def _may_be_free(goal: Goal, world: World, robot: Robot) -> bool:
     """Whether the goal region may hold a free position; False only where certainly none is."""
+    if world.clearance(robot.footprint, (goal.x, goal.y, goal.theta or 0.0)) > 0.0:
+        return True  # asked first, since a plan needs the index of this footprint anyway
     radius = robot.footprint.inscribed_radius
     if radius == 0.0 and robot.footprint.vertices is not None:
         return True  # the robot's origin may stand in an obstacle that the footprint passes beside
