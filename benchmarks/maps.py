@@ -38,8 +38,8 @@ from cbrrt_ompl.scenario.maps.loading import load_map
 from cbrrt_ompl.scenario.maps.occupancy_map import OccupancyMap
 
 WAFFLE_PI, JACKAL = ROBOTS["turtlebot3_waffle_pi"], ROBOTS["jackal"]
-MAP_PLANNING = PlanningSettings(horizon=2.0, step=0.05, goal_bias=0.05, max_samples=10**9)
-BARN_PLANNING = PlanningSettings(horizon=1.0, step=0.05, goal_bias=0.05, max_samples=10**9)
+MAP_PLANNING = PlanningSettings(max_samples=10**9)
+BARN_PLANNING = PlanningSettings(horizon=1.0, max_samples=10**9)
 BARN_BOUNDS = Bounds((-4.575, 0.0), (0.075, 14.5))
 
 

@@ -21,7 +21,7 @@ from cbrrt_ompl.optimise.anytime import further_guesses, robust_search
 from cbrrt_ompl.optimise.improving import Found, Improver, check_improvement, geodesic_guesses
 from cbrrt_ompl.optimise.improving import warm_up as warm_up_improvement
 from cbrrt_ompl.optimise.objective import Objective
-from cbrrt_ompl.planners.registry import PLANNERS, is_compiled, law_of, planner_named
+from cbrrt_ompl.planners.registry import PLANNERS, is_compiled, law_of, planner_named, scenario_for
 from cbrrt_ompl.planners.search import Search, search_in
 from cbrrt_ompl.planners.warm_up import warm_up
 from cbrrt_ompl.problem.robot import Footprint
@@ -148,6 +148,7 @@ def plan(
     check_scenario(scenario)
     asked = scenario
     is_anytime = planner_named(planner).is_anytime
+    scenario = scenario_for(planner, scenario)
     _check_arguments(seed, time_limit, progress)
     check_improvement(improve_for, max_iterations, objective, callback, should_stop, name="improve_for")
     check_step(scenario.robot, scenario.planning)
@@ -201,7 +202,7 @@ def _plan_anytime(
 ) -> PlanResult:
     """The first plan of CB-RRT, or of the geodesic where that takes long; then guess after guess."""
     first_seed = int(np.random.default_rng().integers(2**31)) if seed is None else seed
-    search, most = robust_search(scenario, first_seed), scenario.planning.max_samples
+    search, most = robust_search(scenario, first_seed), scenario.planning.filled().max_samples
     watch.start()
     improver.begin(watch.left(), watch.began)
     search.run(watch.should_stop, min(FIRST_SAMPLES, most))
@@ -268,7 +269,7 @@ def _plan_compiled(scenario: Scenario, planner: str, seed: int | None, watch: _W
     row = PLANNERS[planner]
     search = search_in(scenario, row.law(scenario.planning), seed, robust=row.is_robust)
     watch.start()
-    search.run(watch.should_stop, scenario.planning.max_samples)
+    search.run(watch.should_stop, scenario.planning.filled().max_samples)
     return _result_of(search, planner, seed, watch)
 
 

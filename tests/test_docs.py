@@ -19,6 +19,7 @@ from test_readme import blocks
 
 import cbrrt_ompl
 from cbrrt_ompl.cli import build_parser
+from cbrrt_ompl.planners.registry import PLANNERS
 from cbrrt_ompl.problem.robot import Gains, Limits
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.scenario import footprints, map_layers, scenario_file
@@ -49,7 +50,7 @@ DEFAULTS: dict[str, Mapping[str, Any]] = {
     "robot.gains": Gains()._asdict(),
     "start": State(0.0, 0.0)._asdict(),
     "goal": vars(Goal(0.0, 0.0)),
-    "planning": vars(PlanningSettings()),
+    "planning": vars(PlanningSettings().filled()),
 }
 """What the code takes for a key that is left out."""
 
@@ -89,6 +90,16 @@ def test_the_defaults_on_the_scenario_page_are_those_of_the_code(docs: Path, hea
         if stated is not None:
             plain = yaml.safe_load(stated[1])
             assert plain == value or numbers_agree(plain, value, math.radians(1.0) if stated[2] else 1.0), name
+
+
+def test_the_scenario_page_has_the_defaults_of_the_planners_for_maps(docs: Path) -> None:
+    page = (docs / "scenario.md").read_text(encoding="utf-8")
+    section = page.partition("\n## planning\n")[2]
+    found = re.findall(r"^\| `(\w+)`[^|]*\|[^|]*\| (?:`([^|]*)`|the same) \|", section, flags=re.MULTILINE)
+    usual, stated = vars(PlanningSettings().filled()), {name: yaml.safe_load(own) for name, own in found if own}
+    for row in (PLANNERS["cb-rrt-robust"], PLANNERS["cb-rrt-anytime"]):
+        own = vars(row.settings(PlanningSettings()))
+        assert stated == {name: value for name, value in own.items() if value != usual[name]}
 
 
 def numbers_agree(stated: Any, value: Any, unit: float) -> bool:

@@ -207,7 +207,7 @@ def test_a_new_scenario_has_what_was_asked_for(room: Path, capsys: pytest.Captur
     assert data["start"] == {"x": 0.7, "y": 1.5, "theta_deg": -90.0}
     assert data["goal"].items() >= {"x": 3.2, "y": 1.5, "theta_deg": 90.0, "speed_tolerance": REST_SPEED}.items()
     assert data["map"] == {"file": "room.yaml", "unknown": "free"}
-    assert data["planning"].items() >= {"closed_loop": True, "goal_bias": 0.05, "horizon": 1.5}.items()
+    assert data["planning"].items() >= {"clearance": 0.05, "horizon": 1.5}.items()
     (room / "again.yaml").write_text(out)
     assert load_scenario("again.yaml").planning.horizon == 1.5
 

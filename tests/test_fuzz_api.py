@@ -148,7 +148,7 @@ def test_plain_values_make_a_scenario_or_are_refused_in_our_own_words(data: Any)
     [
         ("horizon", "2", "planning.horizon: got '2', expected a number above 0, from 1e-09 to 1e+06 [s]"),
         ("horizon", 1e308, "planning.horizon: got 1e+308, expected a number above 0, from 1e-09 to 1e+06 [s]"),
-        ("goal_bias", None, "planning.goal_bias: got None, expected a number from 0 to 1"),
+        ("goal_bias", "1", "planning.goal_bias: got '1', expected a number from 0 to 1"),
         (
             "max_samples",
             True,

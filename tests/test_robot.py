@@ -28,7 +28,8 @@ def test_the_default_robot_is_that_of_the_paper() -> None:
     assert robot.limits[:2] == (0.0, 1.0)
     assert np.degrees(robot.limits[2:4]) == pytest.approx([-30.0, 30.0])
     assert (robot.limits.acceleration, math.degrees(robot.limits.angular_acceleration)) == pytest.approx((0.6, 30.0))
-    assert robot.gains == (1.5, 0.5, 0.1)
+    assert robot.gains is None
+    assert Gains() == (1.5, 0.5, 0.1)
 
 
 @pytest.mark.parametrize(

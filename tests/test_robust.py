@@ -11,6 +11,7 @@ import pytest
 from cbrrt_ompl import (
     Bounds,
     Box,
+    Gains,
     Goal,
     Limits,
     PlanningSettings,
@@ -109,6 +110,8 @@ def test_solutions_are_valid(blind_alley: Scenario, seed: int) -> None:
 def test_half_the_samples_of_the_plain_planner_do_in_the_maze(scenarios: Path) -> None:
     """The plain planner keeps extending nodes at the walls, which are nearest to most samples."""
     maze = load_scenario(scenarios / "maze.yaml")
+    same = replace(maze.planning, closed_loop=False, goal_bias=0.0, max_samples=50_000)
+    maze = replace(maze, planning=same, robot=replace(maze.robot, gains=Gains()))
     medians = {}
     for planner in ("cb-rrt-compiled", ROBUST):
         results = [plan(maze, planner, seed=seed, time_limit=60.0) for seed in range(11)]
@@ -120,7 +123,7 @@ def test_half_the_samples_of_the_plain_planner_do_in_the_maze(scenarios: Path) -
 def test_the_planner_of_ompl_grows_the_same_tree(blind_alley: Scenario) -> None:
     settings = replace(blind_alley.planning, max_samples=500)
     scenario = replace(blind_alley, goal=Goal(4.0, 0.0, tolerance=1e-9), planning=settings)
-    setup = make_setup(scenario)
+    setup = make_setup(scenario, ROBUST)
     planner = CompiledPlanner(setup.getSpaceInformation(), scenario, ROBUST, seed=2)
     setup.setPlanner(planner)
     assert not setup.solve(60.0)

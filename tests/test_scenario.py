@@ -20,7 +20,7 @@ from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import InputError, Problem, ScenarioError
 from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, Obstacle, OrientedBox, Polygon
 from cbrrt_ompl.problem.robot import Footprint, Gains, Limits, Robot
-from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
+from cbrrt_ompl.problem.settings import FilledSettings, Goal, PlanningSettings, State
 from cbrrt_ompl.scenario import plain_yaml
 from cbrrt_ompl.scenario.plain_yaml import MAX_DEPTH, MAX_FILE_SIZE, parse_yaml, resolve
 from cbrrt_ompl.scenario.scenario import (
@@ -900,8 +900,8 @@ def test_the_scenes_of_the_paper_have_its_robot_and_settings(scenarios: Path, na
     scenario = load_scenario(scenarios / f"{name}.yaml")
     assert scenario.world.bounds == Bounds((-5.0, -5.0), (5.0, 5.0))
     assert (scenario.start, scenario.goal) == (State(-4.0, -4.0), Goal(4.0, 4.0, 0.5))
-    assert scenario.robot == Robot()
-    assert dataclasses.replace(scenario.planning, look_ahead=None) == PlanningSettings()
+    assert dataclasses.replace(scenario.robot, gains=scenario.robot.gains or Gains()) == Robot(gains=Gains())
+    assert dataclasses.replace(scenario.planning, look_ahead=None).filled() == FilledSettings()
     assert scenario.planning.look_ahead == scenario.robot.limits.v_max * scenario.planning.horizon
     assert "reconstruction" in (scenarios / f"{name}.yaml").read_text(encoding="utf-8").split("name:")[0]
 

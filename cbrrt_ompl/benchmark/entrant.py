@@ -17,7 +17,7 @@ from cbrrt_ompl.ompl_plugin.setup import (
     make_planner,
 )
 from cbrrt_ompl.ompl_plugin.space import register_projection
-from cbrrt_ompl.planners.registry import is_compiled
+from cbrrt_ompl.planners.registry import is_compiled, scenario_for
 from cbrrt_ompl.scenario.scenario import Scenario
 
 
@@ -48,7 +48,7 @@ class Entrant(ob.Planner):  # type: ignore[misc]  # OMPL has no type information
         self.equipment: Equipment | None = None
         self.planner: Any = None
         self.planning_time = 0.0
-        self._setup, self._scenario = setup, scenario
+        self._setup, self._scenario = setup, scenario_for(name, scenario)
         self._rounds = 0
 
     def equip(self) -> None:
@@ -89,6 +89,11 @@ class Entrant(ob.Planner):  # type: ignore[misc]  # OMPL has no type information
             self.planner.getPlannerData(data)
 
     @property
+    def max_samples(self) -> int:
+        """Samples that a run may draw."""
+        return self._scenario.planning.filled().max_samples
+
+    @property
     def samples(self) -> int:
         """Samples drawn in this run; for OMPL's own planners the rounds of their main loop."""
         if isinstance(self.planner, CompiledPlanner):
@@ -114,7 +119,7 @@ class Entrant(ob.Planner):  # type: ignore[misc]  # OMPL has no type information
 
     def _stop_condition(self, condition: Any, end: float) -> Callable[[], bool]:
         """OMPL's condition, the end of the time and, where OMPL does the sampling, the limit of samples."""
-        limit = math.inf if is_compiled(self.getName()) else self._scenario.planning.max_samples
+        limit = math.inf if is_compiled(self.getName()) else self.max_samples
 
         def should_stop() -> bool:
             if self._rounds >= limit or time.perf_counter() >= end or condition():

@@ -83,7 +83,9 @@ class Experiment:
             plan(self._scenario, name, seed=0, time_limit=WARM_UP)
         benchmark = ot.Benchmark(self._setup, self._name)
         benchmark.addExperimentParameter("scenario", "VARCHAR(512)", self._scenario.name.replace(" = ", "="))
-        benchmark.addExperimentParameter("max_samples", "INTEGER", str(self._scenario.planning.max_samples))
+        limits = {entrant.max_samples for entrant in self.entrants.values()}
+        if len(limits) == 1:
+            benchmark.addExperimentParameter("max_samples", "INTEGER", str(limits.pop()))
         for entrant in self.entrants.values():
             entrant.time_limit = time_limit
             benchmark.addPlanner(entrant)
@@ -121,9 +123,8 @@ class Experiment:
     def _note(self, planner: Any, run: Any) -> None:
         """OMPL has ended a run: add our columns."""
         entrant, seed = self._active, self._seeds[planner.getName()][self._run]
-        max_samples = self._scenario.planning.max_samples
         columns = search_columns(
-            seed, entrant.planning_time, entrant.samples, entrant.extension_attempts, max_samples
+            seed, entrant.planning_time, entrant.samples, entrant.extension_attempts, entrant.max_samples
         ) | trajectory_columns(self._trajectory(), self._scenario)
         for column, value in columns.items():
             run[column] = value
@@ -157,5 +158,5 @@ def check_entries(scenario: Scenario, seeds: Mapping[str, Sequence[int]]) -> Non
     if len({len(runs) for runs in seeds.values()}) != 1 or not all(seeds.values()):
         raise InputError(Problem("seeds", {name: len(runs) for name, runs in seeds.items()}, "as many runs for all"))
     if len({law_of(name, scenario.planning) == CLOSED_LOOP for name in seeds}) > 1:
-        expected = "cb-rrt and cb-rrt-compiled alone in closed loop: they steer by references, the others by velocities"
+        expected = "planners of one kind: those in closed loop steer by references, the others by velocities"
         raise SettingsError(Problem("planners", ", ".join(seeds), expected))

@@ -52,6 +52,7 @@ def add_parser(commands: Commands) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """``cbrrt plan``."""
     check_output_files(arguments, FILES)
+    from cbrrt_ompl.planners.registry import planner_named
     from cbrrt_ompl.planning import plan
     from cbrrt_ompl.scenario.sources import is_map
 
@@ -59,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
     planner = arguments.planner or (map_planner() if is_map(arguments.scenario) else "cb-rrt")
     limits = {"improve_for": arguments.improve_for, "max_iterations": arguments.max_iterations}
     warm_up(planner, improves=any(limit is not None for limit in limits.values()))
-    with plan_progress(scenario.planning.max_samples, planner) as progress:
+    with plan_progress(planner_named(planner).settings(scenario.planning).max_samples, planner) as progress:
         result = plan(scenario, planner, arguments.seed, arguments.time_limit, progress=progress, **limits)
     trajectory = result.trajectory
     if arguments.trajectory is not None and trajectory is not None:

@@ -7,7 +7,6 @@ import math
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,9 +25,6 @@ REST_SPEED = 0.01
 
 GOAL = {"tolerance": 0.25, "heading_tolerance": 0.25}
 """Tolerances of a goal in a map [m, rad], those of Nav2's goal checker."""
-
-PLANNING = {"closed_loop": True, "goal_bias": 0.05}
-"""Settings of the planners in a map."""
 
 CLEARANCE = 0.05
 """Distance to keep in a map [m]."""
@@ -117,12 +113,11 @@ def given_source(arguments: argparse.Namespace, may_lack: bool = False) -> tuple
 
 def map_data(path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
     """The scenario of a map, without its robot, start and goal."""
-    has_clearance = any(field.name == "clearance" for field in fields(_settings()))
     return {
         "name": path.stem,
         "map": {"file": os.fspath(path)},
         "goal": dict(GOAL) if arguments.goal and len(arguments.goal) > 2 else {"tolerance": GOAL["tolerance"]},
-        "planning": {**PLANNING, **({"clearance": CLEARANCE} if has_clearance else {})},
+        "planning": {"clearance": CLEARANCE},
     }
 
 
@@ -130,12 +125,6 @@ def print_remarks(source: MapSource | OccupancyMap | None) -> None:
     """Print what was not taken as the files of a map say."""
     for remark in source.remarks if source is not None else ():
         print(f"cbrrt: {remark}", file=sys.stderr)
-
-
-def _settings() -> Any:
-    from cbrrt_ompl.problem.settings import PlanningSettings
-
-    return PlanningSettings
 
 
 def _check_given(arguments: argparse.Namespace) -> None:

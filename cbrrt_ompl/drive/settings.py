@@ -32,8 +32,8 @@ class DriveSettings:
     """Time between two looks, and what a plan may take [s]; whole planning steps."""
     planner: str = "cb-rrt-robust"
     """Name of a planner that keeps the acceleration limits."""
-    goal_bias: float = 0.05
-    """Share of samples that are the goal itself, 0 to 1."""
+    goal_bias: float | None = None
+    """Share of samples that are the goal itself, 0 to 1; None is what the scenario or else the planner has."""
     margin: float = 0.01
     """Distance that the footprint keeps from all that is known [m]."""
     max_samples: int | None = None
@@ -50,7 +50,7 @@ class DriveSettings:
             for name in ("sensor_range", "cycle", "time_limit")
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0)
         ]
-        if not 0.0 <= self.goal_bias <= 1.0:
+        if self.goal_bias is not None and not 0.0 <= self.goal_bias <= 1.0:
             problems.append(Problem("goal_bias", self.goal_bias, "a number from 0 to 1"))
         if not (math.isfinite(self.margin) and self.margin >= 0.0):
             problems.append(Problem("margin", self.margin, "a number of 0 or more [m]"))
@@ -77,7 +77,8 @@ class DriveSettings:
 
     def planning(self, planning: PlanningSettings) -> PlanningSettings:
         """Planning settings of a drive: those of its scenario, the goal bias and braking without collision."""
-        return replace(planning, goal_bias=self.goal_bias, brake_safe=True)
+        goal_bias = planning.goal_bias if self.goal_bias is None else self.goal_bias
+        return replace(planning, goal_bias=goal_bias, brake_safe=True)
 
 
 def stopping_distance(robot: Robot, step: float) -> float:

@@ -50,11 +50,12 @@ def draw_extension(
     """
     from cbrrt_ompl.motion.control_laws import reference_pose  # here, since a figure of a world needs no kernels
     from cbrrt_ompl.motion.model import STEERING, make_model
-    from cbrrt_ompl.planners.registry import law_of
+    from cbrrt_ompl.planners.registry import planner_named
     from cbrrt_ompl.trajectory.replay import extension_trajectories
 
-    law = law_of(planner, planning)
-    model = make_model(law, robot, Goal(0.0, 0.0), planning)
+    row = planner_named(planner)
+    law = row.law(planning)
+    model = make_model(law, row.robot(robot), Goal(0.0, 0.0), planning)
     reference = reference_pose(*node[:3], *sample, planning.reference_distance(robot.limits))
     trajectories = extension_trajectories(node, sample, model)
     distances = [math.hypot(one.x[-1] - reference[0], one.y[-1] - reference[1]) for one in trajectories]

@@ -13,7 +13,7 @@ from cbrrt_ompl.motion.kinematics import dynamic_step, kinematic_step, saturate
 from cbrrt_ompl.motion.laws import GAINS, LIMITS, law_address
 from cbrrt_ompl.motion.manoeuvres import BRAKE, REVERSE, approach_command, has_ended, is_manoeuvre
 from cbrrt_ompl.motion.records import Record, Records, record_array
-from cbrrt_ompl.problem.robot import Robot
+from cbrrt_ompl.problem.robot import Gains, Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, goal_distance, heading_error
 
 OPEN_LOOP, CLOSED_LOOP, STEERING = 0, 1, 2
@@ -75,7 +75,7 @@ def make_model(law: int, robot: Robot, goal: Goal, planning: PlanningSettings) -
 
     Args:
         law: `OPEN_LOOP`, `CLOSED_LOOP` or `STEERING`.
-        robot: limits and gains.
+        robot: limits and gains; the paper's gains where none are given.
         goal: goal region.
         planning: settings.
 
@@ -90,7 +90,8 @@ def make_model(law: int, robot: Robot, goal: Goal, planning: PlanningSettings) -
     model["room"] = motion_room(planning.clearance)
     model["keep_cut"] = planning.cut_extension == "keep"
     model["approaches"], model["brake_safe"] = planning.approaches(goal), planning.brake_safe
-    model["limits"], model["gains"] = tuple(robot.limits), tuple(robot.gains)
+    model["limits"] = tuple(robot.limits)
+    model["gains"] = tuple(Gains() if robot.gains is None else robot.gains)
     model["goal"] = (
         goal.x,
         goal.y,

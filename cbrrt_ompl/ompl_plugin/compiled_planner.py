@@ -15,7 +15,7 @@ from cbrrt_ompl.ompl_plugin.goals import region_of
 from cbrrt_ompl.ompl_plugin.space import write_state
 from cbrrt_ompl.ompl_plugin.user_parts import Query, check_parts, is_same_part, query_of
 from cbrrt_ompl.ompl_plugin.warm_up import warm_up
-from cbrrt_ompl.planners.registry import planner_named
+from cbrrt_ompl.planners.registry import planner_named, scenario_for
 from cbrrt_ompl.planners.search import Search
 from cbrrt_ompl.problem.settings import State
 from cbrrt_ompl.scenario.scenario import Scenario
@@ -47,7 +47,7 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
         """
         super().__init__(si, name)
         self.search: Search | None = None
-        self._scenario, self._seed = scenario, seed
+        self._scenario, self._seed = scenario_for(name, scenario), seed
         self._query: Query | None = None
         self._goal: tuple[Any, Any] = (None, None)
 
@@ -85,7 +85,9 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
             if not starts:
                 return ob.PlannerStatus(ob.PlannerStatus.INVALID_START)
             self.search = self._new_search(starts)
-        self.search.run(lambda _: bool(should_stop()), self.search.samples + self._scenario.planning.max_samples)
+        self.search.run(
+            lambda _: bool(should_stop()), self.search.samples + self._scenario.planning.filled().max_samples
+        )
         if not self.search.has_reached_goal:
             return ob.PlannerStatus(ob.PlannerStatus.TIMEOUT)
         problem.addSolutionPath(self._path(), False, 0.0, self.getName())
@@ -123,7 +125,7 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
         )
         settings: dict[str, Any] = {
             "seed": self._seed,
-            "goal_bias": scenario.planning.goal_bias,
+            "goal_bias": scenario.planning.filled().goal_bias,
             "robust": planner_named(self.getName()).is_robust,
         }
         if extender.is_compiled:

@@ -43,7 +43,7 @@ class PaperPlanner(OwnSampler, oc.RRT):  # type: ignore[misc]  # OMPL has no typ
         """
         super().__init__(si)
         self.setName(name)
-        self.setGoalBias(scenario.planning.goal_bias)
+        self.setGoalBias(scenario.planning.filled().goal_bias)
         self._scenario, self._compiled = scenario, compiled
         self._query: Query | None = None
         self._goal: Any = None

@@ -68,7 +68,7 @@ def run(
         if isinstance(solver, PaperPlanner):
             solver.looks_around = False
         setup.setup()
-        rounds = _Rounds(scenario.planning.max_samples, should_stop)
+        rounds = _Rounds(scenario.planning.filled().max_samples, should_stop)
         condition = ob.PlannerTerminationCondition(ob.PlannerTerminationConditionFn(rounds))
         on_start()
         began = time.perf_counter()

@@ -17,7 +17,7 @@ from cbrrt_ompl.ompl_plugin.paper_planner import PaperPlanner
 from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
 from cbrrt_ompl.ompl_plugin.space import make_control_space, make_reference_space, make_state_space, write_state
 from cbrrt_ompl.ompl_plugin.validity import FclStateValidityChecker
-from cbrrt_ompl.planners.registry import Backend, planner_named
+from cbrrt_ompl.planners.registry import Backend, planner_named, scenario_for
 from cbrrt_ompl.scenario.scenario import Scenario, check_scenario
 
 FREE_VOLUME_SAMPLES = 8192
@@ -69,7 +69,7 @@ def make_equipped_setup(
     """
     compiled = use_compiled_methods(compiled)
     check_scenario(scenario)
-    row = planner_named(planner)
+    row, scenario = planner_named(planner), scenario_for(planner, scenario)
     check_step(scenario.robot, scenario.planning)
     limits, bounds = scenario.robot.limits, scenario.world.bounds
     space = make_state_space(bounds, limits, compiled)
@@ -102,6 +102,7 @@ def equip(si: Any, scenario: Scenario, planner: str, compiled: bool | None = Non
         planner: a known planner's name.
         compiled: see :func:`make_setup`.
     """
+    scenario = scenario_for(planner, scenario)
     law = planner_named(planner).law(scenario.planning)
     propagator = TwoWheelPropagator(
         si,
@@ -125,7 +126,7 @@ def make_planner(si: Any, scenario: Scenario, planner: str, compiled: bool | Non
         planner: a known planner's name.
         compiled: see :func:`make_setup`.
     """
-    row = planner_named(planner)
+    row, scenario = planner_named(planner), scenario_for(planner, scenario)
     if row.backend is Backend.COMPILED:
         return CompiledPlanner(si, scenario, planner)
     if row.backend is Backend.PLUGIN:

@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cbrrt_ompl.motion.kinematics import wrap_angle
-from cbrrt_ompl.motion.model import CLOSED_LOOP
 from cbrrt_ompl.optimise.guess import Guess, guess_from_trajectory
 from cbrrt_ompl.optimise.guesses import AHEAD, BACKWARDS, geodesic, guess_along
+from cbrrt_ompl.planners.registry import law_of, scenario_for
 from cbrrt_ompl.planners.search import Search, search_in
 from cbrrt_ompl.problem.robot import Footprint
 from cbrrt_ompl.scenario.scenario import Scenario
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 
-GOAL_BIAS = 0.05
-"""Fraction of samples that are the goal, where the scenario asks for none."""
+ROBUST = "cb-rrt-robust"
+"""The planner of first and further plans."""
 
 SAMPLES = 20_000
 """Samples of each further plan, at most."""
@@ -29,9 +29,9 @@ ROUNDS = 4
 
 
 def robust_search(scenario: Scenario, seed: int) -> Search:
-    """A search by CB-RRT as it suits real maps: robust, the law evaluated at every step, with a goal bias."""
-    goal_bias = scenario.planning.goal_bias or GOAL_BIAS
-    return search_in(scenario, CLOSED_LOOP, seed, goal_bias=goal_bias, robust=True)
+    """A search by CB-RRT as it suits real maps."""
+    scenario = scenario_for(ROBUST, scenario)
+    return search_in(scenario, law_of(ROBUST, scenario.planning), seed, robust=True)
 
 
 def further_guesses(scenario: Scenario, seed: int, has_ended: Callable[[], bool]) -> Iterator[Guess]:

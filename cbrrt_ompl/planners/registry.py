@@ -5,12 +5,15 @@ To add a planner of OMPL, add its row; a compiled kind of its own also needs its
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from enum import Enum
 
 from cbrrt_ompl.errors import UnknownPlannerError
 from cbrrt_ompl.motion.model import CLOSED_LOOP, OPEN_LOOP, STEERING
-from cbrrt_ompl.problem.settings import PlanningSettings
+from cbrrt_ompl.problem.robot import Gains, Limits, Robot, gains_for
+from cbrrt_ompl.problem.settings import FilledSettings, PlanningSettings
+from cbrrt_ompl.scenario.scenario import Scenario
 
 
 class Backend(Enum):
@@ -46,13 +49,29 @@ class Planner:
     """Whether it goes on after its first plan (in OMPL's own set-up and benchmark its first plan is all there is)."""
     ompl_class: str = "RRT"
     """Name of its class in ``ompl.control``."""
+    defaults: FilledSettings = FilledSettings()
+    """What stands for settings that are left out."""
+    default_gains: Callable[[Limits], Gains] = lambda _: Gains()
+    """What stands for gains that are left out, by the limits of the robot."""
 
     def law(self, planning: PlanningSettings) -> int:
         """How it drives: `STEERING`, `CLOSED_LOOP` or `OPEN_LOOP` (as OMPL's own planners do)."""
         if self.steering is Steering.RATES:
             return STEERING
-        return CLOSED_LOOP if self.steering is Steering.KANAYAMA and planning.closed_loop else OPEN_LOOP
+        is_closed = self.steering is Steering.KANAYAMA and self.settings(planning).closed_loop
+        return CLOSED_LOOP if is_closed else OPEN_LOOP
 
+    def settings(self, planning: PlanningSettings) -> FilledSettings:
+        """Settings with this planner's defaults for what is left out."""
+        return planning.filled(self.defaults)
+
+    def robot(self, robot: Robot) -> Robot:
+        """A robot with this planner's default gains, where none are given."""
+        return robot if robot.gains is not None else replace(robot, gains=self.default_gains(robot.limits))
+
+
+FOR_MAPS = FilledSettings(goal_bias=0.2, max_samples=500_000, closed_loop=True)
+"""Settings that suit a map."""
 
 _COMPILED, _PLUGIN, _OMPL = Backend.COMPILED, Backend.PLUGIN, Backend.OMPL
 _KANAYAMA, _RATES, _RANDOM = Steering.KANAYAMA, Steering.RATES, Steering.RANDOM
@@ -65,7 +84,12 @@ PLANNERS: dict[str, Planner] = {
     ),
     "s-rrt-compiled": Planner("S-RRT as one compiled loop", _COMPILED, _RATES),
     "cb-rrt-robust": Planner(
-        "cb-rrt-compiled that passes over nodes extended in vain: for real maps", _COMPILED, _KANAYAMA, is_robust=True
+        "cb-rrt-compiled that passes over nodes extended in vain: for real maps",
+        _COMPILED,
+        _KANAYAMA,
+        is_robust=True,
+        defaults=FOR_MAPS,
+        default_gains=gains_for,
     ),
     "cb-rrt-anytime": Planner(
         "cb-rrt-robust, and then better and better by optimal control",
@@ -73,6 +97,8 @@ PLANNERS: dict[str, Planner] = {
         _KANAYAMA,
         is_robust=True,
         is_anytime=True,
+        defaults=FOR_MAPS,
+        default_gains=gains_for,
     ),
     "rrt": Planner("OMPL's control::RRT with random controls", _OMPL, _RANDOM),
     "kpiece1": Planner("OMPL's KPIECE1", _OMPL, _RANDOM, ompl_class="KPIECE1"),
@@ -94,6 +120,18 @@ def planner_named(name: object) -> Planner:
     if not (isinstance(name, str) and name in PLANNERS):
         raise UnknownPlannerError(name, list(PLANNERS))  # type: ignore[arg-type]  # whatever it is
     return PLANNERS[name]
+
+
+def scenario_for(planner: str, scenario: Scenario) -> Scenario:
+    """A scenario with a planner's defaults for what is left out; what is given stays.
+
+    Whatever runs a planner begins with this, so that all its parts see the same settings.
+    """
+    row = planner_named(planner)
+    robot, planning = row.robot(scenario.robot), row.settings(scenario.planning)
+    if robot is scenario.robot and planning is scenario.planning:
+        return scenario
+    return replace(scenario, robot=robot, planning=planning)
 
 
 def law_of(name: str, planning: PlanningSettings) -> int:

@@ -205,7 +205,7 @@ def search_in(
         goal_bias: see :class:`Search`; that of the scenario if not given.
         robust: see :class:`Search`.
     """
-    planning, robot = scenario.planning, scenario.robot
+    planning, robot = scenario.planning.filled(), scenario.robot
     return Search(
         make_model(law, robot, scenario.goal, planning),
         scenario.world,

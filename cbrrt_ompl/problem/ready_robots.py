@@ -30,7 +30,10 @@ Published: the point, 0 to 1 m/s, 30 deg/s, 0.6 m/s^2, 30 deg/s^2 and the gains.
 """
 
 _AGILE = Gains(1.5, 10.0, 3.0)
-"""Gains of the TurtleBots, our choice: at 0.2 m/s the paper's gains would ask for 0.1 rad/s at most."""
+"""Gains of the TurtleBots, our choice: at 0.2 m/s the paper's gains would ask for 0.1 rad/s at most.
+
+The other robots have none of their own: each planner fills them.
+"""
 
 TURTLEBOT3_BURGER = Robot(
     rectangle(0.138, 0.178, x_center=-0.032),
@@ -68,7 +71,7 @@ Published: 508 mm x 430 mm, 2 m/s (Clearpath's data sheet); 4 rad/s, and half as
 wheels, which stands for the skidding (jackal_control, config/control.yaml); the distance of the wheels, 0.37559 m
 (jackal_description, jackal.urdf.xacro). Chosen: the wheels are no faster than the robot straight on, and change their
 speed by 2 m/s^2, which makes 2 m/s^2 and 7.1 rad/s^2 for the robot; control.yaml lets 20 m/s^2 and 25 rad/s^2 pass,
-more than its tyres can hold. Paper's gains.
+more than its tyres can hold.
 """
 
 PIONEER_3DX = Robot(
@@ -80,7 +83,7 @@ PIONEER_3DX = Robot(
 Published: 455 mm x 381 mm, 1.2 m/s, 300 deg/s (Adept's data sheet); the body's offset, 0.3 m/s^2 and 1.74 rad/s^2
 (its maker's simulator AMRISim, PioneerRobotModels.world.inc); the distance of the wheels (0.33 m in the model of
 Webots; 0.316 m in the URDF p3dx_description). Chosen: the rectangle around its rounded body, and wheels no faster than
-the robot straight on. Paper's gains.
+the robot straight on.
 """
 
 ROBOTS: dict[str, Robot] = {

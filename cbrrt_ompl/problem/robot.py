@@ -90,6 +90,22 @@ class Gains(NamedTuple):
         ]
 
 
+def gains_for(limits: Limits) -> Gains:
+    """Gains that follow from what a robot can do.
+
+        k_theta = min(omega_max, sqrt(alpha_max * 1 rad)) / v_max,    k_y = k_theta^2 / 4,    k_x = 0
+
+    An error of a radian is turned away as fast as the robot can turn through one, and the robot approaches its line
+    without overshooting (critical damping: along the line, y'' + k_theta y' + k_y y = 0). Without k_x the robot drives
+    at v_max cos(theta_e): slowly while it faces elsewhere.
+
+    Args:
+        limits: of the robot.
+    """
+    k_theta = min(limits.omega_max, math.sqrt(limits.angular_acceleration)) / limits.v_max
+    return Gains(0.0, 0.25 * k_theta * k_theta, k_theta)
+
+
 @dataclass(frozen=True, eq=False)
 class Footprint:
     """The area that the robot covers, in its own frame; make one by ``point``, ``disc`` or ``polygon``.
@@ -205,7 +221,10 @@ class Footprint:
 
 @dataclass(frozen=True)
 class Robot:
-    """A two-wheeled robot; the defaults are the paper's (a point with the limits and gains of Tetra-DS II).
+    """A two-wheeled robot; the defaults are the paper's (a point with the limits of Tetra-DS II).
+
+    Gains that are left out are None: each planner fills them with its own defaults, the paper's or such that follow
+    from the limits.
 
     Raises:
         RobotError: with every limit and gain that is wrong.
@@ -213,7 +232,7 @@ class Robot:
 
     footprint: Footprint = Footprint()
     limits: Limits = Limits()
-    gains: Gains = Gains()
+    gains: Gains | None = None
 
     def __post_init__(self) -> None:
         """Check limits and gains together."""
@@ -221,11 +240,11 @@ class Robot:
         wrong = [
             Problem(f"robot.{name}", getattr(self, name), f"a value of type {kind.__name__}")
             for name, kind in parts
-            if not isinstance(getattr(self, name), kind)
+            if not (isinstance(getattr(self, name), kind) or (name == "gains" and self.gains is None))
         ]
         if wrong:
             raise RobotError(wrong)
-        problems = self.limits.problems() + self.gains.problems()
+        problems = self.limits.problems() + ([] if self.gains is None else self.gains.problems())
         if problems:
             raise RobotError([Problem(f"robot.{p.field}", p.value, p.expected) for p in problems])
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from numbers import Integral
 from typing import Any, NamedTuple
 
@@ -125,7 +125,10 @@ class Goal:
 
 @dataclass(frozen=True)
 class PlanningSettings:
-    """Settings of both planners; the defaults are our readings of the paper.
+    """Settings of the planners, as far as they are given; the other defaults are our readings of the paper.
+
+    What suits one planner and not another is None where it is left out: each planner fills it with its own defaults,
+    see :meth:`filled`.
 
     Raises:
         SettingsError: with every value that makes no sense.
@@ -135,18 +138,18 @@ class PlanningSettings:
     """Duration t_h of one extension [s]."""
     step: float = 0.05
     """Integration step dt, and the spacing of the checked states [s]."""
-    goal_bias: float = 0.0
-    """Share of samples that are the goal itself, 0 to 1."""
-    max_samples: int = 50_000
-    """Samples after which a plan has failed: K of Algorithm I."""
+    goal_bias: float | None = None
+    """Share of samples that are the goal itself, 0 to 1; None is the planner's default."""
+    max_samples: int | None = None
+    """Samples after which a plan has failed: K of Algorithm I; None is the planner's default."""
     cut_extension: str = "discard"
     """``discard`` or ``keep`` the free part of an extension that meets an obstacle."""
     equal_control_tolerance: float = 0.1
     """eps_u of Algorithm II, line 5 [m/s and rad/s]; 0 refuses only an identical control, a negative one nothing."""
     look_ahead: float | None = None
     """Largest distance of the reference from its node [m]; None is ``v_max * horizon``."""
-    closed_loop: bool = False
-    """Evaluate the control law at every step instead of once an extension."""
+    closed_loop: bool | None = None
+    """Evaluate the control law at every step instead of once an extension; None is the planner's default."""
     law: str = "kanayama"
     """Control law of CB-RRT by name: ``kanayama``, ``posq``, or one of :func:`cbrrt_ompl.register_law`."""
     final_approach: bool = True
@@ -171,10 +174,12 @@ class PlanningSettings:
             problems.append(
                 Problem("planning.horizon", self.horizon, f"1 to {MAX_STEPS} steps of {self.step:g} s (planning.step)")
             )
-        if not (is_number(self.goal_bias) and 0.0 <= self.goal_bias <= 1.0):
+        if self.goal_bias is not None and not (is_number(self.goal_bias) and 0.0 <= self.goal_bias <= 1.0):
             problems.append(Problem("planning.goal_bias", self.goal_bias, "a number from 0 to 1"))
-        if not (is_number(self.max_samples) and isinstance(self.max_samples, Integral)) or not (
-            1 <= self.max_samples <= MAX_SAMPLES
+        if self.max_samples is not None and not (
+            is_number(self.max_samples)
+            and isinstance(self.max_samples, Integral)
+            and 1 <= self.max_samples <= MAX_SAMPLES
         ):
             expected = f"a whole number of 1 or more, at most {MAX_SAMPLES}"
             problems.append(Problem("planning.max_samples", self.max_samples, expected))
@@ -189,11 +194,25 @@ class PlanningSettings:
             problems.append(Problem("planning.law", self.law, "the name of a control law"))
         if self.look_ahead is not None and not _is_positive(self.look_ahead):
             problems.append(Problem("planning.look_ahead", self.look_ahead, f"{A_POSITIVE_NUMBER} [m]"))
-        if not isinstance(self.closed_loop, bool | np.bool_):
+        if not isinstance(self.closed_loop, bool | np.bool_ | None):
             problems.append(Problem("planning.closed_loop", self.closed_loop, "True or False"))
         if problems:
             raise SettingsError(problems)
         _keep_floats(self, "horizon", "step", "goal_bias", "equal_control_tolerance", "look_ahead", "clearance")
+
+    def filled(self, defaults: FilledSettings | None = None) -> FilledSettings:
+        """These settings with defaults for what is left out.
+
+        Args:
+            defaults: of a planner; the paper's if not given.
+        """
+        if isinstance(self, FilledSettings):
+            return self
+        usual = FilledSettings() if defaults is None else defaults
+        given = {field.name: getattr(self, field.name) for field in fields(self)}
+        return FilledSettings(
+            **{name: getattr(usual, name) if value is None else value for name, value in given.items()}
+        )
 
     def approaches(self, goal: Goal) -> bool:
         """Whether final approaches to a goal are tried."""
@@ -207,6 +226,15 @@ class PlanningSettings:
     def reference_distance(self, limits: Limits) -> float:
         """Largest distance of the reference from its node for a robot [m]."""
         return limits.v_max * self.horizon if self.look_ahead is None else self.look_ahead
+
+
+@dataclass(frozen=True)
+class FilledSettings(PlanningSettings):
+    """Settings of which none is left out; the defaults are the paper's."""
+
+    goal_bias: float = 0.0
+    max_samples: int = 50_000
+    closed_loop: bool = False
 
 
 def _is_positive(value: object) -> bool:

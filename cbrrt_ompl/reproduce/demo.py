@@ -14,6 +14,7 @@ from cbrrt_ompl.figures import draw_plan, draw_velocities
 from cbrrt_ompl.figures.saving import save_figure
 from cbrrt_ompl.files import write_file
 from cbrrt_ompl.ompl_plugin.availability import has_ompl
+from cbrrt_ompl.planners.registry import planner_named
 from cbrrt_ompl.planning import PlanResult, plan
 from cbrrt_ompl.reproduce.published import PAPER, Published
 from cbrrt_ompl.scenario.scenario import Scenario, load_scenario
@@ -121,7 +122,7 @@ def run_demo(output: Path, seed: int | None, watch: Watch) -> Iterator[DemoRun]:
     runs = []
     for scene, planner in pairs:
         scenario = scenarios[scene]
-        with watch(scenario.planning.max_samples, f"{scene} {planner}") as progress:
+        with watch(planner_named(planner).settings(scenario.planning).max_samples, f"{scene} {planner}") as progress:
             result = plan(scenario, planner, seed, TIME_LIMIT, progress=progress)
         verified = None if result.trajectory is None else verify(result.trajectory, scenario).ok
         run = DemoRun(scene, scenario, result, verified)

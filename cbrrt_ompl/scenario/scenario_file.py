@@ -150,7 +150,7 @@ def _robot(value: object, path: str, report: Report) -> Robot | None:
             return None
         values["footprint"] = values.pop("robot_radius")
     for part in {"limits", "gains"} & values.keys():
-        values[part] = getattr(model, part)._replace(**values[part])
+        values[part] = (getattr(model, part) or Gains())._replace(**values[part])
     return build(partial(replace, model), values, path, report)
 
 
@@ -272,7 +272,7 @@ def _obstacle_data(obstacle: Obstacle) -> dict[str, Any]:
 
 
 def robot_data(robot: Robot) -> dict[str, Any]:
-    """Plain value of a robot, in full."""
+    """Plain value of a robot, without what is left out."""
     footprint, limits = robot.footprint, robot.limits
     return {
         "footprint": {"type": "disc", "radius": float(footprint.radius)}
@@ -285,7 +285,7 @@ def robot_data(robot: Robot) -> dict[str, Any]:
             "angular_acceleration": float(limits.angular_acceleration),
             **_wheel_data(limits),
         },
-        "gains": {name: float(value) for name, value in robot.gains._asdict().items()},
+        **({} if robot.gains is None else {"gains": {k: float(value) for k, value in robot.gains._asdict().items()}}),
     }
 
 

@@ -45,13 +45,13 @@ def scenario_text(data: Mapping[str, Any], command: str) -> str:
 
 
 _MEANINGS = {
-    "closed_loop": "ask the control law at every step",
-    "goal_bias": "fraction of the samples that are the goal",
     "clearance": "distance to keep from everything [m]",
 }
 _MORE = (
     ("horizon", 2.0, "duration of one extension [s]: about a room at full speed"),
-    ("max_samples", 50000, "samples after which a plan has failed"),
+    ("closed_loop", True, "ask the control law at every step"),
+    ("goal_bias", 0.2, "fraction of the samples that are the goal"),
+    ("max_samples", 500000, "samples after which a plan has failed"),
     ("brake_safe", True, "keep only what the robot can brake from"),
 )
 
