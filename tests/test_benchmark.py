@@ -291,6 +291,7 @@ def test_no_planner_runs_with_the_sampler_or_the_model_of_another(
 ) -> None:
     """Syclop's RRT allocates its sampler at its set-up, when the space information may still have another's."""
     monkeypatch.setattr(experiment_module, "plan", lambda *_, **__: None)  # leaves the warming up out
+    field = replace(field, planning=replace(field.planning, closed_loop=False))  # for all of them to share a space
     experiment = Experiment(field, {name: [1] for name in PLANNERS}, "open")
     sampled: dict[str, int] = defaultdict(int)
     laws: dict[str, set[int]] = defaultdict(set)
@@ -321,6 +322,7 @@ def test_every_run_repeats_the_plan_with_its_seed(field: Scenario) -> None:
     seeds = (5, 3)
     left_out = {"syclop-est", "cb-rrt-anytime"}  # a second to set up, and as syclop-rrt; in OMPL it ends when solved
     names = [name for name in PLANNERS if name not in left_out]
+    field = replace(field, planning=replace(field.planning, closed_loop=False))  # for all of them to share a space
     log = Experiment(field, {name: seeds for name in names}, "open").run(10.0)
     for name, runs in cells(log).items():
         for seed, run in zip(seeds, runs, strict=True):

@@ -41,6 +41,8 @@ else:
     pytest.skip("all of it needs OMPL", allow_module_level=True)
 
 OPEN = Scenario(name="open", world=World(Bounds((-5.0, -5.0), (5.0, 5.0))), start=State(-4.0, 0.0), goal=Goal(4.0, 0.0))
+BY_VELOCITIES = replace(OPEN, planning=PlanningSettings(closed_loop=False))
+"""The same, with controls that are velocities for every planner."""
 OURS = [name for name, planner in PLANNERS.items() if planner.backend is not Backend.OMPL]
 ALL = list(PLANNERS)
 MOST = [*OURS, "rrt", "est"]
@@ -359,7 +361,7 @@ def test_other_bounds_of_velocities_and_controls_are_refused_by_name(planner: st
         lambda setup: setup.getStateSpace().getSubspace(2).setBounds(bounds((0.0, 0.1), (-0.1, 0.1))),
         lambda setup: setup.getControlSpace().setBounds(bounds((0.0, 0.1), (-0.1, 0.1))),
     ):
-        setup = make_setup(OPEN, planner)
+        setup = make_setup(BY_VELOCITIES, planner)
         change(setup)
         with pytest.raises(SettingsError, match=f"{planner}: bounds .*scenario.robot.limits.*rrt"):
             setup.setup()
@@ -378,7 +380,7 @@ def half_speed(state: Any, control: Any, duration: float, result: Any) -> None:
 
 @pytest.mark.parametrize("planner", MOST)
 def test_the_users_propagator_moves_the_robot(planner: str) -> None:
-    setup = make_setup(OPEN, planner)
+    setup = make_setup(BY_VELOCITIES, planner)
     setup.setStatePropagator(oc.StatePropagatorFn(half_speed))
     assert solve(setup) == "Exact solution"
     assert setup.getSolutionPath().check()
@@ -386,6 +388,15 @@ def test_the_users_propagator_moves_the_robot(planner: str) -> None:
     assert max(state.v for state in dense_states(setup)) <= 0.5 * limits.v_max + 1e-12
     trajectory = trajectory_from_path(setup.getSolutionPath(), OPEN)
     assert trajectory.states[-1] == pytest.approx(np.array(read_state(last_state(setup))), abs=1e-9)
+
+
+@pytest.mark.parametrize("planner", ["cb-rrt-robust", "cb-rrt"])
+def test_a_users_propagator_is_refused_in_closed_loop(planner: str) -> None:
+    """It would take references for velocities."""
+    setup = make_setup(replace(OPEN, planning=PlanningSettings(closed_loop=True)), planner)
+    setup.setStatePropagator(oc.StatePropagatorFn(half_speed))
+    with pytest.raises(SettingsError, match=f"{planner}: planning.closed_loop: got True, expected False with a state"):
+        setup.setup()
 
 
 @pytest.mark.parametrize("part", ["checker", "propagator", "goal"])
@@ -403,7 +414,7 @@ def test_an_exception_of_a_users_part_reaches_the_caller(planner: str, part: str
             fail_later()
             return 1.0
 
-    setup = make_setup(OPEN, planner)
+    setup = make_setup(BY_VELOCITIES if part == "propagator" else OPEN, planner)
     if part == "checker":
         setup.setStateValidityChecker(ob.StateValidityCheckerFn(fail_later))
     elif part == "propagator":

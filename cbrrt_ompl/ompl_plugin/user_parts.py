@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from cbrrt_ompl.errors import Problem, SettingsError
 from cbrrt_ompl.motion.model import CLOSED_LOOP, check_step
 from cbrrt_ompl.ompl_plugin.native_layout import LayoutError, object_address
+from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
 from cbrrt_ompl.ompl_plugin.space import bounds_of, covers, read_state
 from cbrrt_ompl.ompl_plugin.validity import FclStateValidityChecker
 from cbrrt_ompl.planners.registry import planner_named
@@ -85,7 +86,8 @@ def check_parts(si: Any, scenario: Scenario, planner: str) -> None:
 
     Raises:
         SettingsError: if the bounds of the velocities or of the controls are no longer those of the robot, or the step
-            is too long for it, or ``brake_safe`` is asked for with a validity checker that is not ours.
+            is too long for it, or ``brake_safe`` is asked for with a validity checker that is not ours, or the loop is
+            closed with a propagator that is not.
     """
     problems = []
     limits, space = scenario.robot.limits, si.getStateSpace()
@@ -99,6 +101,9 @@ def check_parts(si: Any, scenario: Scenario, planner: str) -> None:
         found = (*list(controls.low)[:2], *list(controls.high)[:2])
         if found != (*low, *high):
             problems.append(Problem("bounds of the control space", found, robot_alone))
+    elif not isinstance(si.getStatePropagator(), TwoWheelPropagator):
+        expected = "False with a state propagator of one's own: in closed loop controls are references, not velocities"
+        problems.append(Problem("planning.closed_loop", True, expected))
     step = si.getPropagationStepSize()
     if step > 0.0 and step != scenario.planning.step:
         check_step(scenario.robot, replace(scenario.planning, step=step, horizon=step))
