@@ -632,8 +632,8 @@ def test_bench_and_report_from_the_command_line(
     ):
         assert plan(load_scenario(open_file), planner.removeprefix("control_"), seed).nodes == nodes
     assert main(["report", str(database), "--output", str(output)]) == 0
-    header, columns, *rows, path = capsys.readouterr().out.splitlines()
-    assert (header, path) == ("open, medians", str(output / "report.md"))
+    header, columns, *rows, page, path = capsys.readouterr().out.splitlines()
+    assert (header, page, path) == ("open, medians", str(output / "report.html"), str(output / "report.md"))
     assert [row.split()[:4] for row in rows] == [[planner, "2", "of", "2"] for planner in ("cb-rrt", "rrt")]
     assert {len(line) for line in (columns, *rows)} <= set(range(81))
     assert main(["report", str(database), "--output", str(output), "--json"]) == 0

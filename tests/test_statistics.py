@@ -171,11 +171,15 @@ def test_the_report_is_the_same_again_and_complete(tmp_path: Path) -> None:
     )
     write_report(database, tmp_path / "one")
     write_report(database, tmp_path / "two")
-    names = {"report.md", "summary.csv", "ratios.csv", "success_gaps.png", "boxes_gaps.png"}
+    names = {"report.html", "report.md", "summary.csv", "ratios.csv", "success_gaps.png", "boxes_gaps.png"}
     assert {path.name for path in (tmp_path / "one").iterdir()} == names
-    for name in ("report.md", "summary.csv", "ratios.csv"):
+    for name in ("report.html", "report.md", "summary.csv", "ratios.csv"):
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+    page = (tmp_path / "one" / "report.html").read_text(encoding="utf-8")
+    assert page.count('src="data:image/png;base64,') == 2 and "http" not in page
+    assert '<td class="l">rrt</td><td class="r">6 of 8</td><td class="r">75 % [41, 93]</td>' in page
     text = (tmp_path / "one" / "report.md").read_text(encoding="utf-8")
+    assert "](success_gaps.png)" in text and "](boxes_gaps.png)" in text
     assert "| cb-rrt | 8 of 8 | 100 % [68, 100] | 4.00 [2.00, 6.00] | 104 [102, 106] | 20.4 [20.2, 20.6] |" in text
     assert "| rrt | 6 of 8 | 75 % [41, 93] | 40.0 [20.0, 60.0] | 1,000 [1,000, 1,010] | 30.4 [30.2, 30.6] |" in text
     with open(tmp_path / "one" / "summary.csv", newline="", encoding="utf-8") as file:

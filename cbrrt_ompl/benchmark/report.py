@@ -1,4 +1,4 @@
-"""The report of a campaign, from its database alone: tables as Markdown and CSV, charts as PNG."""
+"""The report of a campaign, from its database alone: one HTML page, Markdown with its charts beside it, and CSV."""
 
 from __future__ import annotations
 
@@ -12,9 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from cbrrt_ompl.benchmark.charts import MEASURES, boxes_figure, success_figure
+from cbrrt_ompl.benchmark.document import Block, Bullets, Document, Heading, Picture, Table, Text
 from cbrrt_ompl.benchmark.results import Experiment, Series, read_experiments
 from cbrrt_ompl.benchmark.statistics import (
     Interval,
@@ -26,8 +28,7 @@ from cbrrt_ompl.benchmark.statistics import (
     wilson_interval,
 )
 from cbrrt_ompl.errors import UnknownPlannerError
-from cbrrt_ompl.figures.saving import save_figure
-from cbrrt_ompl.files import write_file
+from cbrrt_ompl.files import write_file, write_files
 
 SUMMARY_COLUMNS = (
     "scenario", "planner", "runs", "successes", "success_rate", "success_low", "success_high", "invalid", "crashed",
@@ -44,7 +45,9 @@ class Report:
     """What was written."""
 
     path: Path
-    """The report itself, Markdown."""
+    """The report in Markdown."""
+    page: Path
+    """The report as one HTML page that needs no other file."""
     invalid: tuple[str, ...]
     """Planners whose exact solutions failed verification, with scenario and number."""
     summary: tuple[dict[str, Any], ...]
@@ -52,7 +55,7 @@ class Report:
 
 
 def write_report(database: Path, output: Path, reference: str | None = None) -> Report:
-    """Write ``report.md``, ``summary.csv``, ``ratios.csv`` and two charts a scenario.
+    """Write ``report.html``, ``report.md``, ``summary.csv``, ``ratios.csv`` and two charts a scenario.
 
     Args:
         database: a benchmark database.
@@ -74,13 +77,13 @@ def write_report(database: Path, output: Path, reference: str | None = None) -> 
     summary = [_summary_row(one) for experiment in experiments for one in experiment.series]
     _write_csv(output / "summary.csv", SUMMARY_COLUMNS, summary)
     _write_csv(output / "ratios.csv", RATIO_COLUMNS, _ratio_rows(ratios))
-    for experiment in experiments:
-        save_figure(success_figure(experiment), output / f"success_{experiment.name}.png")
-        save_figure(boxes_figure(experiment), output / f"boxes_{experiment.name}.png")
-    path = output / "report.md"
-    write_file(path, "\n".join(_markdown(experiments, reference, ratios)))
+    document = Document("Benchmark report", list(_blocks(experiments, reference, ratios)))
+    for name, png in document.pictures.items():
+        write_file(output / name, png)
+    path, page = output / "report.md", output / "report.html"
+    write_files({path: document.markdown(), page: document.html()})
     rows = (dict(zip(SUMMARY_COLUMNS, row, strict=True)) for row in summary)
-    return Report(path, tuple(_invalid(experiments)), tuple(rows))
+    return Report(path, page, tuple(_invalid(experiments)), tuple(rows))
 
 
 Ratios = dict[tuple[str, str, str], Ratio]
@@ -101,46 +104,56 @@ def all_ratios(experiment: Experiment) -> Ratios:
     return ratios
 
 
-def _markdown(experiments: Sequence[Experiment], reference: str, ratios: dict[str, Ratios]) -> Iterator[str]:
-    """The report, line by line."""
-    yield "# Benchmark report\n"
+def _blocks(experiments: Sequence[Experiment], reference: str, ratios: dict[str, Ratios]) -> Iterator[Block]:
+    """The report, block by block."""
     yield from _overview(experiments)
-    yield "\n## Verification\n"
+    yield Heading("Verification")
     yield from _verification(experiments)
     for experiment in experiments:
-        yield f"\n## {experiment.title}\n"
-        yield from _table(
-            ("planner", "succeeded", "success [95 % interval]", "time [ms]", "nodes", "duration [s]"),
-            (_table_row(one) for one in experiment.series),
-        )
-        yield f"\n![Share of runs solved against time](success_{experiment.name}.png)\n"
-        yield f"![Planning time, nodes and duration](boxes_{experiment.name}.png)\n"
-        found = ratios[experiment.name]
-        if len(experiment.series) > 1 and any(one.planner == reference for one in experiment.series):
-            yield f"Medians, as multiples of those of {reference}:\n"
-            others = [one.planner for one in experiment.series if one.planner != reference]
-            rows = ((p, *(_ratio(found[measure, p, reference]) for measure, _ in MEASURES)) for p in others)
-            yield from _table(("planner", "time", "nodes", "duration"), rows)
-    yield "\n## How to read the numbers\n"
-    yield NOTES
+        yield from _experiment(experiment, reference, ratios[experiment.name])
+    yield Heading("How to read the numbers")
+    yield Bullets(NOTES)
 
 
-NOTES = """\
-- A run has succeeded if it found an exact solution, drew no more samples than the scenario allows, and its trajectory
-  passed verification. Success rates have Wilson's 95 % interval.
-- Time, nodes and duration: median [quartiles] over all runs. A failed run counts as infinite: a median of ∞ says that
-  half of the runs or more have failed.
-- Time is that of the search alone, where the database tells it; OMPL's own column `time` has up to some milliseconds
-  more.
-- Ratios of medians have percentile bootstrap intervals (95 %, 5,000 resamples, the two planners drawn independently);
-  where both medians are infinite there is none. ratios.csv has all pairs of planners, summary.csv the full numbers.
-- Intervals are for one comparison each: of twenty that show no true difference, one will miss.
-"""
+NOTES = (
+    "A run has succeeded if it found an exact solution, drew no more samples than the scenario allows, and its "
+    "trajectory passed verification. Success rates have Wilson's 95 % interval.",
+    "Time, nodes and duration: median [quartiles] over all runs. A failed run counts as infinite: a median of ∞ says "
+    "that half of the runs or more have failed.",
+    "Time is that of the search alone, where the database tells it; OMPL's own column `time` has up to some "
+    "milliseconds more.",
+    "Ratios of medians have percentile bootstrap intervals (95 %, 5,000 resamples, the two planners drawn "
+    "independently); where both medians are infinite there is none. ratios.csv has all pairs of planners, summary.csv "
+    "the full numbers.",
+    "Intervals are for one comparison each: of twenty that show no true difference, one will miss.",
+)
 
 
-def _overview(experiments: Sequence[Experiment]) -> Iterator[str]:
+def _experiment(experiment: Experiment, reference: str, ratios: Ratios) -> Iterator[Block]:
+    """One scenario: a table of its planners, two charts, and how they compare."""
+    yield Heading(experiment.title)
+    header = ("planner", "succeeded", "success [95 % interval]", "time [ms]", "nodes", "duration [s]")
+    yield Table(header, [_table_row(one) for one in experiment.series])
+    yield _picture(f"success_{experiment.name}.png", success_figure(experiment), "Runs solved against time")
+    caption = "Planning time, nodes and duration: every run, its quartiles, and failures at the right"
+    yield _picture(f"boxes_{experiment.name}.png", boxes_figure(experiment), caption)
+    if len(experiment.series) > 1 and any(one.planner == reference for one in experiment.series):
+        yield Text(f"Medians, as multiples of those of {reference}:")
+        others = [one.planner for one in experiment.series if one.planner != reference]
+        rows = [(p, *(_ratio(ratios[measure, p, reference]) for measure, _ in MEASURES)) for p in others]
+        yield Table(("planner", "time", "nodes", "duration"), rows)
+
+
+def _picture(name: str, figure: Figure, caption: str) -> Picture:
+    """A chart in the report."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png")
+    return Picture(name, buffer.getvalue(), caption)
+
+
+def _overview(experiments: Sequence[Experiment]) -> Iterator[Block]:
     """What was run, where and when."""
-    rows = (
+    rows = [
         (
             experiment.title,
             str(len(experiment.series)),
@@ -152,37 +165,37 @@ def _overview(experiments: Sequence[Experiment]) -> Iterator[str]:
             experiment.host,
         )
         for experiment in experiments
-    )
+    ]
     total = sum(len(one) for experiment in experiments for one in experiment.series)
     versions = ", ".join(dict.fromkeys(experiment.version for experiment in experiments))
-    yield f"{total:,} runs, {versions}.\n"
+    yield Text(f"{total:,} runs, {versions}.")
     header = ("scenario", "planners", "runs each", "time limit [s]", "max. samples", "seed", "began", "host")
-    yield from _table(header, rows)
+    yield Table(header, rows)
 
 
-def _verification(experiments: Sequence[Experiment]) -> Iterator[str]:
+def _verification(experiments: Sequence[Experiment]) -> Iterator[Block]:
     """Which planners' solutions are none, and what crashed."""
     every = [one for experiment in experiments for one in experiment.series]
     solved, unverified = sum(int(one.solved.sum()) for one in every), sum(int(one.unverified.sum()) for one in every)
     invalid = list(_invalid(experiments))
     if invalid:
-        yield "**Exact solutions that failed verification**, counted as failures:\n"
-        yield from (f"- {line}" for line in invalid)
+        yield Text("**Exact solutions that failed verification**, counted as failures:")
+        yield Bullets(invalid)
     elif solved > unverified:
-        yield f"All {solved - unverified:,} exact solutions that were verified passed."
+        yield Text(f"All {solved - unverified:,} exact solutions that were verified passed.")
     if unverified:
-        yield f"\n{unverified:,} of {solved:,} exact solutions were not verified; they count as they are."
+        yield Text(f"{unverified:,} of {solved:,} exact solutions were not verified; they count as they are.")
     if not solved:
-        yield "There is no exact solution to verify."
+        yield Text("There is no exact solution to verify.")
     crashed = [
-        f"- {one.planner} in {experiment.title}: {int(one.crashed.sum())} of {len(one)} runs"
+        f"{one.planner} in {experiment.title}: {int(one.crashed.sum())} of {len(one)} runs"
         for experiment in experiments
         for one in experiment.series
         if one.crashed.any()
     ]
     if crashed:
-        yield "\n**Runs that crashed or hung**, counted as failures:\n"
-        yield from crashed
+        yield Text("**Runs that crashed or hung**, counted as failures:")
+        yield Bullets(crashed)
 
 
 def _invalid(experiments: Iterable[Experiment]) -> Iterator[str]:
@@ -192,13 +205,6 @@ def _invalid(experiments: Iterable[Experiment]) -> Iterator[str]:
             if one.invalid.any():
                 count = f"{int(one.invalid.sum())} of {int(one.solved.sum())} exact solutions"
                 yield f"{one.planner} in {experiment.title}: {count}"
-
-
-def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
-    """A table in Markdown, numbers to the right."""
-    yield f"| {' | '.join(header)} |"
-    yield f"|{'|'.join([' --- ', *(' ---: ' for _ in header[1:])])}|"
-    yield from (f"| {' | '.join(cell.replace('|', '/') for cell in row)} |" for row in rows)
 
 
 def _table_row(one: Series) -> tuple[str, ...]:

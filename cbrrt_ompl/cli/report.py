@@ -39,11 +39,12 @@ def run(arguments: argparse.Namespace) -> int:
 
     report = write_report(arguments.database, arguments.output, arguments.reference)
     if arguments.json:
-        print_json({"report": report.path, "invalid": report.invalid, "summary": report.summary})
+        print_json({"report": report.path, "page": report.page, "invalid": report.invalid, "summary": report.summary})
         return DONE
     _print_medians(report)
     for line in report.invalid:
         print(f"failed verification: {line}")
+    print(report.page)
     print(report.path)
     return DONE
 

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
+from cbrrt_ompl.benchmark.document import Block, Document, Heading, Picture, Table, Text
 from cbrrt_ompl.planning import PlanResult
 from cbrrt_ompl.reproduce import charts
+from cbrrt_ompl.reproduce.claim_blocks import Evidence, Summary
 from cbrrt_ompl.reproduce.claims import QueryCosts, make_claims
-from cbrrt_ompl.reproduce.document import Block, Document, Evidence, Heading, Picture, Summary, Table, Text
 from cbrrt_ompl.reproduce.grids import GridStudy
 from cbrrt_ompl.reproduce.numbers import (
     count_text,
