@@ -26,10 +26,18 @@ class Problem:
     value: object
     expected: str
 
+    def told(self, source: str) -> str:
+        """One line about a file or call; what the system refused is told as a sentence: ``no such file: x.yaml``."""
+        if isinstance(self.value, Refusal) and not self.field:
+            return self.value.about(source)
+        return f"{source}: {self}" if source else str(self)
+
     def __str__(self) -> str:
         """One line: field, value, expectation."""
-        shown = "missing" if self.value is MISSING else f"got {_short(self.value)}"
         where = f"{self.field}: " if self.field else ""
+        if isinstance(self.value, Refusal):
+            return where + self.value.about("")
+        shown = "missing" if self.value is MISSING else f"got {_short(self.value)}"
         return f"{where}{shown}, expected {self.expected}"
 
 
@@ -53,6 +61,18 @@ class Remark(str):
         return str(self)
 
 
+class Refusal(Remark):
+    """Why the system did not read or write a file, in its words; see :func:`cbrrt_ompl.files.refusal`."""
+
+    __slots__ = ()
+
+    def about(self, source: str) -> str:
+        """A sentence about a file: the reason has a place for its name, or comes before it."""
+        if not source:
+            return self.replace(" {}", "")
+        return self.replace("{}", source) if "{}" in self else f"{self}: {source}"
+
+
 class InputError(CbrrtError, ValueError):
     """Input that cannot be used: a file, or the arguments of a call.
 
@@ -65,7 +85,7 @@ class InputError(CbrrtError, ValueError):
         """Report one mistake or several, each on a line of its own."""
         self.problems = [problems] if isinstance(problems, Problem) else list(problems)
         self.source = source
-        super().__init__("\n".join(f"{source}: {p}" if source else str(p) for p in self.problems))
+        super().__init__("\n".join(problem.told(source) for problem in self.problems))
 
 
 class WorldError(InputError):

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from cbrrt_ompl.errors import InputError, Problem, Remark
+from cbrrt_ompl.errors import InputError, Problem, Refusal, Remark
 
 
 def as_path(path: object, error: type[InputError]) -> Path:
@@ -27,9 +27,17 @@ def as_path(path: object, error: type[InputError]) -> Path:
     raise error(Problem("path", path, "the name of a file"))
 
 
-def reason_of(error: Exception) -> str:
-    """Why a file was not opened: the system's words, or ours for a name that Python refuses before it asks."""
-    return getattr(error, "strerror", None) or "no name of a file"
+def refusal(error: Exception, verb: str = "read") -> Refusal:
+    """Why a file was not opened: the system's words, or ours for a name that Python refuses before it asks.
+
+    Args:
+        error: what the system, or Python, raised.
+        verb: what was tried, ``read`` or ``write``.
+    """
+    if isinstance(error, FileNotFoundError):
+        return Refusal("no such file" if verb == "read" else "no such folder to write in")
+    words = str(getattr(error, "strerror", None) or "no name of a file")
+    return Refusal(f"cannot {verb} {{}}: {words[0].lower()}{words[1:]}")
 
 
 def write_file(path: Path, content: bytes | str, error: type[InputError] = InputError) -> None:
@@ -51,8 +59,7 @@ def write_new_file(path: Path, content: str) -> None:
             Problem("", Remark("a file that exists"), "a new one: none is overwritten"), str(path)
         ) from None
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(Problem("", Remark(reason), "a file that can be written"), str(path)) from None
+        raise InputError(Problem("", refusal(error, "write"), "a file that can be written"), str(path)) from None
 
 
 def write_files(contents: Mapping[Path, bytes | str], error: type[InputError] = InputError) -> None:
@@ -80,7 +87,7 @@ def write_files(contents: Mapping[Path, bytes | str], error: type[InputError] = 
         for draft, target in drafts:
             os.replace(draft, target)
     except (OSError, ValueError) as cause:  # ValueError: a NUL in the name
-        raise error(Problem("", Remark(reason_of(cause)), "a file that can be written"), str(path)) from cause
+        raise error(Problem("", refusal(cause, "write"), "a file that can be written"), str(path)) from cause
     finally:
         for draft, _ in drafts:
             with suppress(OSError):  # gone into its place, or never made

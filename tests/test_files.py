@@ -66,7 +66,7 @@ def test_a_full_disk_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(os, "fsync", fill_the_disk)
     with pytest.raises(InputError) as caught:
         WRITERS[name](path)
-    assert str(caught.value).endswith(f": got {os.strerror(errno.ENOSPC)}, expected a file that can be written")
+    assert str(caught.value).startswith("cannot write ") and str(caught.value).endswith(": no space left on device")
     assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == {**before, name: b"old"}
 
 
@@ -74,7 +74,7 @@ def test_files_that_belong_together_are_all_new_or_all_old(tmp_path: Path) -> No
     image, folder = tmp_path / "map.pgm", tmp_path / "map.yaml"
     image.write_bytes(b"old")
     folder.mkdir()
-    with pytest.raises(InputError, match=f"map.yaml: got {os.strerror(errno.EISDIR)}, expected a file"):
+    with pytest.raises(InputError, match=r"cannot write .*map.yaml: is a directory"):
         write_files({image: b"new", folder: "text"})
     assert image.read_bytes() == b"old"
     assert sorted(file.name for file in tmp_path.iterdir()) == ["map.pgm", "map.yaml"]
@@ -83,15 +83,15 @@ def test_files_that_belong_together_are_all_new_or_all_old(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
-        ("none/a.md", os.strerror(errno.ENOENT)),
-        ("file/a.md", os.strerror(errno.ENOTDIR)),
-        ("a" * 300, os.strerror(errno.ENAMETOOLONG)),
-        ("a\0b", "no name of a file"),
+        ("none/a.md", "no such folder to write in: "),
+        ("file/a.md", ": not a directory"),
+        ("a" * 300, ": file name too long"),
+        ("a\0b", ": no name of a file"),
     ],
 )
 def test_a_place_where_nothing_can_be_is_one_line(tmp_path: Path, name: str, reason: str) -> None:
     (tmp_path / "file").write_text("x")
-    with pytest.raises(InputError, match=f"got .*{reason}.*, expected a file that can be written"):
+    with pytest.raises(InputError, match=reason):
         write_file(tmp_path / name, "text")
     assert [file.name for file in tmp_path.iterdir()] == ["file"]
 
@@ -101,7 +101,7 @@ def test_a_device_takes_what_is_written_and_stays_a_device(tmp_path: Path) -> No
     full, null = tmp_path / "full.csv", tmp_path / "null.csv"
     full.symlink_to("/dev/full")
     null.symlink_to("/dev/null")
-    with pytest.raises(InputError, match=f"got {os.strerror(errno.ENOSPC)}"):
+    with pytest.raises(InputError, match="full.csv: no space left on device"):
         TRAJECTORY.save(full)
     TRAJECTORY.save(null)
     assert all(stat.S_ISCHR(path.stat().st_mode) for path in (full, null))

@@ -78,7 +78,7 @@ def test_what_a_map_lacks_to_be_planned_in_is_asked_for_at_once(room: Path, caps
     ("changes", "words"),
     [
         (["--robot", "jakal"], "robot: got 'jakal', expected one of tetra_ds_ii"),
-        (["--robot", "nav2.yaml"], "nav2.yaml: got No such file or directory"),
+        (["--robot", "nav2.yaml"], "nav2.yaml: no such file"),
         (["--start", "x", "1", "0"], "--start: got 'x', expected numbers X Y THETA [m, m, rad]; an angle may be 90deg"),
         (["--start", "1", "1deg", "0"], "--start: got '1deg'"),
         (["--goal", "3"], "--goal: got '3', expected numbers X Y, or X Y THETA"),
@@ -226,7 +226,7 @@ def test_a_new_scenario_never_takes_the_place_of_a_file(room: Path, capsys: pyte
         (["room.yaml"], "--robot: missing, expected a ready robot"),
         (["office", "--robot", "jackal"], "office: got no map, expected a map"),
         (["room.yaml", *ASK, "--start", "2", "2", "0"], "start: got [2.0, 2.0, 0.0]"),
-        (["room.yaml", "--robot", "jackal", "--output", "gone/a.yaml"], "gone/a.yaml: got No such file or directory"),
+        (["room.yaml", "--robot", "jackal", "--output", "gone/a.yaml"], "no such folder to write in: gone/a.yaml"),
         (["room.yaml", "--robot", "jackal", "--set", "robot.footprint=3.0"], "expected a free place for a disc of 3"),
     ],
 )

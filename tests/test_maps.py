@@ -517,7 +517,7 @@ def test_a_saved_map_is_read_back_equal(
 
 def test_a_map_that_cannot_be_written_is_told(tmp_path: Path) -> None:
     found = OccupancyMap(CELLS, 0.5)
-    with pytest.raises(MapError, match="expected a file that can be written"):
+    with pytest.raises(MapError, match="no such folder to write in|cannot write "):
         found.save(tmp_path / "missing" / "map.yaml")
     with pytest.raises(MapError, match="expected a name that ends in .yaml"):
         found.save(tmp_path / "map.png")

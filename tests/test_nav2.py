@@ -146,7 +146,7 @@ def test_a_scenario_with_a_parameter_file_is_saved_with_its_values(tmp_path: Pat
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (None, "nav2.yaml: got No such file or directory, expected a file that can be read"),
+        (None, "nav2.yaml: no such file"),
         ("amcl: {ros__parameters: {z_hit: 0.5}}", "expected parameters of Nav2: limits of a controller"),
         ("just words", "expected parameters of Nav2"),
         ("a: {max_vel_x: -2.0}", "robot.limits.v: got [0.0, -2.0]"),

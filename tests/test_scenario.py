@@ -539,7 +539,7 @@ def test_a_file_that_is_too_large_is_not_parsed(tmp_path: Path) -> None:
 
 def test_a_missing_file_and_a_folder_are_one_line(tmp_path: Path) -> None:
     for path in (tmp_path, tmp_path / "none.yaml", str(tmp_path / "no\0ne.yaml")):
-        with pytest.raises(ScenarioError, match=", expected a file that can be read$"):
+        with pytest.raises(ScenarioError, match="^(no such file: |cannot read ).*none.yaml|^cannot read .*: "):
             load_scenario(path)
 
 
@@ -747,7 +747,7 @@ def test_settings_that_are_numbers_of_numpy_are_saved(tmp_path: Path) -> None:
 
 
 def test_saving_where_nothing_can_be_written_is_one_line(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match=", expected a file that can be written$"):
+    with pytest.raises(ScenarioError, match="^(no such folder to write in: |cannot write )"):
         save_scenario(hall(), tmp_path / "none" / "saved.yaml")
 
 

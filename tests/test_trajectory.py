@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import math
 import os
@@ -387,7 +386,7 @@ def test_an_npz_file_with_pickled_objects_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(TrajectoryError, match="none.csv: missing, expected a trajectory file"):
+    with pytest.raises(TrajectoryError, match="^no such file: .*none.csv"):
         Trajectory.load(tmp_path / "none.csv")
 
 
@@ -400,12 +399,12 @@ def test_an_unknown_suffix_is_refused_with_the_known_ones(tmp_path: Path, name: 
 
 
 def test_a_missing_folder_and_a_folder_as_file_cannot_be_written_or_read(tmp_path: Path) -> None:
-    with pytest.raises(TrajectoryError, match=f"{os.strerror(errno.ENOENT)}.*, expected a file that can be written"):
+    with pytest.raises(TrajectoryError, match="no such folder to write in: .*a.csv"):
         arc().save(tmp_path / "none" / "a.csv")
     (tmp_path / "folder.csv").mkdir()
-    with pytest.raises(TrajectoryError, match="expected a file that can be written"):
+    with pytest.raises(TrajectoryError, match="cannot write .*folder.csv: is a directory"):
         arc().save(tmp_path / "folder.csv")
-    with pytest.raises(TrajectoryError, match="expected a readable file"):
+    with pytest.raises(TrajectoryError, match="cannot read .*folder.csv: is a directory"):
         Trajectory.load(tmp_path / "folder.csv")
     assert [path.name for path in tmp_path.iterdir()] == ["folder.csv"]
 

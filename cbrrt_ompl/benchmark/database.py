@@ -9,7 +9,7 @@ from contextlib import closing
 from pathlib import Path
 
 from cbrrt_ompl.benchmark.log import Log, PlannerLog
-from cbrrt_ompl.errors import InputError, Problem
+from cbrrt_ompl.errors import InputError, Problem, Refusal
 
 TABLES = """
 CREATE TABLE experiments (
@@ -118,7 +118,8 @@ def open_database(path: str | Path) -> sqlite3.Connection:
     """
     path = Path(path)
     if not path.is_file():
-        raise InputError(Problem("", str(path), "the file of a benchmark database"))
+        reason = Refusal("cannot read {}: a folder" if path.is_dir() else "no such file")
+        raise InputError(Problem("", reason, "the file of a benchmark database"), str(path))
     connection = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)
     try:
         found = {name for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}

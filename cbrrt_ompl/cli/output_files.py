@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from cbrrt_ompl.errors import InputError, Problem
+from cbrrt_ompl.errors import InputError, Problem, Refusal
 
 SUFFIXES = {
     "trajectory": (".csv", ".npz", ".json"),
@@ -57,11 +57,7 @@ def check_output_files(arguments: argparse.Namespace, names: Iterable[str]) -> N
         CbrrtError: if matplotlib, which is to draw one of them, cannot be used.
     """
     files = {name: path for name in names if (path := getattr(arguments, name)) is not None}
-    problems = [
-        Problem(f"--{name}", str(path), expected)
-        for name, path in files.items()
-        if (expected := _missing_to_write(path, SUFFIXES[name]))
-    ]
+    problems = [problem for name, path in files.items() if (problem := _problem_with(name, path))]
     if problems:
         raise InputError(problems)
     if "figure" in files or "animation" in files:
@@ -72,14 +68,15 @@ def check_output_files(arguments: argparse.Namespace, names: Iterable[str]) -> N
         check_animation_file(files["animation"])
 
 
-def _missing_to_write(path: Path, suffixes: tuple[str, ...]) -> str | None:
-    """What a file should be to be written; None where it can be."""
+def _problem_with(name: str, path: Path) -> Problem | None:
+    """Why a file of an option cannot be written; None where it can be."""
+    suffixes = SUFFIXES[name]
     if path.suffix.lower() not in suffixes:
-        return f"a file name that ends in {', '.join(suffixes)}"
+        return Problem(f"--{name}", str(path), f"a file name that ends in {', '.join(suffixes)}")
     if not path.parent.is_dir():
-        return f"a file in a folder that exists, {path.parent} does not"
+        return Problem(f"--{name}", Refusal(f"no such folder: {path.parent}"), "a file in a folder that exists")
     if path.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
-        return "a file that may be written"
+        return Problem(f"--{name}", str(path), "a file that may be written")
     return None
 
 

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any
+
+SILENCE = 30.0
+"""Time after which a campaign that nobody watches tells how far it is, once [s]."""
 
 LINE = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}<{remaining}, {rate_fmt}]"
 """A progress line: how many of how many, the time since the beginning and the time left."""
@@ -54,9 +58,9 @@ def plan_progress(total: int, label: str) -> Iterator[Callable[[int, float], Non
 
 @contextmanager
 def run_progress(total: int) -> Iterator[Callable[[int], None]]:
-    """A progress line for a campaign, with the time left; silent where nobody watches."""
+    """A progress line for a campaign, with the time left; where nobody watches, one line once that can be told."""
     if not sys.stderr.isatty():
-        yield lambda _: None
+        yield _one_line(total)
         return
     from tqdm import tqdm
 
@@ -71,3 +75,22 @@ def run_progress(total: int) -> Iterator[Callable[[int], None]]:
             bars[0].update(done - bars[0].n)
 
         yield report
+
+
+def _one_line(total: int) -> Callable[[int], None]:
+    """A report of progress that says once, after a while, how many runs are done and how long the others will take."""
+    began: list[tuple[float, int]] = []
+    told: list[bool] = []
+
+    def report(done: int) -> None:
+        now = time.monotonic()
+        if not began:
+            began.append((now, done))
+        start, before = began[0]
+        if told or done == before or done >= total or now - start < SILENCE:
+            return
+        told.append(True)
+        minutes = (total - done) * (now - start) / (done - before) / 60.0
+        print(f"cbrrt: {done:,} of {total:,} runs, about {max(minutes, 1.0):.0f} min left", file=sys.stderr, flush=True)
+
+    return report

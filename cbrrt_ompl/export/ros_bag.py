@@ -13,7 +13,7 @@ import numpy as np
 
 from cbrrt_ompl.errors import Problem, Remark, TrajectoryError
 from cbrrt_ompl.export.messages import entries_of, nanoseconds, pose_of
-from cbrrt_ompl.files import write_file
+from cbrrt_ompl.files import refusal, write_file
 from cbrrt_ompl.trajectory.track import Track, stamped_track
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 
@@ -94,8 +94,9 @@ def read_track(path: Path, topic: str | None = None) -> Track:
                     last = reader.deserialize(data, connection.msgtype)
             found = sorted({f"{c.topic} ({c.msgtype})" for c in reader.connections})
     except Exception as error:  # of files of all kinds, broken in all ways
-        reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
-        raise TrajectoryError(Problem("", Remark(reason), "a bag of ROS that can be read"), str(path)) from None
+        told = Remark(str(error) or type(error).__name__)
+        reason = refusal(error) if isinstance(error, OSError) and error.strerror else told
+        raise TrajectoryError(Problem("", reason, "a bag of ROS that can be read"), str(path)) from None
     if last is None or not len(last.poses):
         wanted = f"a path on the topic {topic}" if topic else f"a topic of type {PATH_TYPE}"
         raise TrajectoryError(Problem("", Remark(f"the topics {', '.join(found) or 'none'}"), wanted), str(path))

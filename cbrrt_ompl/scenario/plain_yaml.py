@@ -18,7 +18,7 @@ from typing import Any
 import yaml
 
 from cbrrt_ompl.errors import InputError, Problem, Remark
-from cbrrt_ompl.files import reason_of
+from cbrrt_ompl.files import refusal
 
 MAX_FILE_SIZE = 16 * 2**20
 """Largest file that is read [bytes]."""
@@ -61,7 +61,7 @@ def read_yaml(path: Path, problems: list[Problem]) -> object:
         with path.open("rb") as file:
             content = file.read(MAX_FILE_SIZE + 1)
     except (OSError, ValueError) as error:
-        raise InputError(Problem("", Remark(reason_of(error)), "a file that can be read")) from None
+        raise InputError(Problem("", refusal(error), "a file that can be read")) from None
     if len(content) > MAX_FILE_SIZE:
         raise InputError(Problem("", Remark("a larger file"), f"at most {MAX_FILE_SIZE} bytes"))
     try:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from cbrrt_ompl.errors import MISSING, InputError, MapError, Problem, Remark, ScenarioError
+from cbrrt_ompl.files import refusal
 from cbrrt_ompl.scenario.maps.map_files import (
     IMAGE_SUFFIXES,
     MAP_SERVER_KEYS,
@@ -152,8 +153,8 @@ def _scen_line(path: Path, number: int) -> tuple[str, list[str]]:
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "no text in UTF-8"
-        raise ScenarioError(Problem("", Remark(reason), "a file that can be read"), str(path)) from None
+        reason = refusal(error) if isinstance(error, OSError) else Remark("no text in UTF-8")
+        raise ScenarioError(Problem("", reason, "a file that can be read"), str(path)) from None
     problems = [(i, line.split()) for i, line in enumerate(lines, start=1) if line.strip()]
     if problems and problems[0][1][0] == "version":
         del problems[0]

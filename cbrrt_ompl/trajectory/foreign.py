@@ -13,7 +13,7 @@ import numpy as np
 
 from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.errors import MISSING, Problem, Remark, TrajectoryError
-from cbrrt_ompl.files import as_path
+from cbrrt_ompl.files import as_path, refusal
 from cbrrt_ompl.trajectory.track import POSE_COLUMNS, VELOCITY_COLUMNS, Track, stamped_track
 from cbrrt_ompl.trajectory.trajectory import COLUMNS, Trajectory
 
@@ -53,10 +53,8 @@ def load_track(path: str | os.PathLike[str], kinematic: bool = False) -> Traject
         raise TrajectoryError(Problem("suffix", path.suffix, f"one of {known}"), str(path))
     try:
         content = path.read_bytes()
-    except FileNotFoundError:
-        raise TrajectoryError(Problem("", MISSING, "a trajectory file"), str(path)) from None
-    except OSError as error:
-        raise TrajectoryError(Problem("", Remark(error.strerror), "a readable file"), str(path)) from None
+    except (OSError, ValueError) as error:
+        raise TrajectoryError(Problem("", refusal(error), "a trajectory file"), str(path)) from None
     try:
         found = readers[suffix](content) if suffix in readers else _table(content)
         return Trajectory.load(path, kinematic) if found is None else found

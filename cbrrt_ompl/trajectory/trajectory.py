@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.errors import MISSING, Problem, TrajectoryError
-from cbrrt_ompl.files import as_path, write_file
+from cbrrt_ompl.files import as_path, refusal, write_file
 from cbrrt_ompl.problem.settings import MAX_STEPS
 from cbrrt_ompl.shown import Shown
 
@@ -331,10 +331,8 @@ class Trajectory(Shown):
         decode = _FORMATS[_suffix(path, sorted(_FORMATS))].decode
         try:
             content = path.read_bytes()
-        except FileNotFoundError:
-            raise TrajectoryError(Problem("", MISSING, "a trajectory file"), str(path)) from None
-        except OSError as error:
-            raise TrajectoryError(Problem("", error.strerror, "a readable file"), str(path)) from error
+        except (OSError, ValueError) as error:
+            raise TrajectoryError(Problem("", refusal(error), "a trajectory file"), str(path)) from None
         try:
             return cls(**{"kinematic": kinematic, **decode(content)})
         except TrajectoryError as error:

@@ -6,7 +6,7 @@ import csv
 from pathlib import Path
 
 from cbrrt_ompl.errors import MapError, Problem, Remark, WorldError
-from cbrrt_ompl.files import as_path
+from cbrrt_ompl.files import as_path, refusal
 from cbrrt_ompl.problem.obstacles import Disc
 
 HEADER = ["x", "y", "radius"]
@@ -29,8 +29,8 @@ def load_discs(path: str | Path) -> list[Disc]:
         with path.open(encoding="utf-8-sig", newline="") as file:
             rows = list(csv.reader(file))
     except (OSError, ValueError, csv.Error) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise MapError(Problem("", Remark(reason), "a CSV file that can be read"), str(path)) from None
+        reason = refusal(error) if isinstance(error, OSError) else Remark(error)
+        raise MapError(Problem("", reason, "a CSV file that can be read"), str(path)) from None
     if not rows or [cell.strip() for cell in rows[0]] != HEADER:
         found = ",".join(rows[0]) if rows else ""
         raise MapError(Problem("line 1", found, f"the header {','.join(HEADER)}"), str(path))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cbrrt_ompl.collision.occupancy import FREE, MAX_CELLS, OCCUPIED, check_cell_count
 from cbrrt_ompl.errors import MISSING, MapError, Problem, Remark
-from cbrrt_ompl.files import reason_of
+from cbrrt_ompl.files import refusal
 
 FREE_TERRAIN, BLOCKED_TERRAIN = b".GS", b"@OTW"
 """Ground and swamp can be driven on; out of bounds, trees and water can not."""
@@ -31,7 +31,7 @@ def read_movingai(path: Path) -> NDArray[np.int8]:
         with path.open("rb") as file:
             lines = file.read(2 * MAX_CELLS).splitlines()
     except (OSError, ValueError) as error:
-        raise MapError(Problem("", Remark(reason_of(error)), "a file that can be read"), str(path)) from None
+        raise MapError(Problem("", refusal(error), "a file that can be read"), str(path)) from None
     try:
         first, columns, rows = _header(lines)
         return _cells(lines, first, columns, rows)

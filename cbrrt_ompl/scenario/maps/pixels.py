@@ -12,6 +12,7 @@ from PIL import Image
 
 from cbrrt_ompl.collision.occupancy import check_cell_count
 from cbrrt_ompl.errors import MapError, Problem, Remark
+from cbrrt_ompl.files import refusal
 from cbrrt_ompl.scenario.maps.pnm import open_straight
 
 FORMATS = ("PNG", "PPM", "BMP", "JPEG", "GIF", "TIFF")
@@ -58,6 +59,8 @@ def read_pixels(path: Path) -> Pixels:
         raise MapError(Problem("image", Remark("too many pixels"), "at most 10^8 cells"), source) from None
     except Image.UnidentifiedImageError:
         raise _unreadable(source, "not an image") from None
+    except (FileNotFoundError, PermissionError, IsADirectoryError) as error:
+        raise MapError(Problem("", refusal(error), "an image"), source) from None
     except Exception as error:  # decoders of broken files raise nearly anything
         reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise _unreadable(source, reason) from None
