@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from cbrrt_ompl.export.following import follow
     from cbrrt_ompl.maps import OccupancyMap, load_dynobench, load_map, save_map
     from cbrrt_ompl.motion.laws import register_law
+    from cbrrt_ompl.ompl_plugin.duration_objective import DurationObjective
     from cbrrt_ompl.ompl_plugin.own_sampler import with_directed_sampler
     from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
     from cbrrt_ompl.ompl_plugin.results import trajectory_from_path
@@ -42,6 +43,7 @@ __all__ = [
     "Box",
     "CbrrtError",
     "Disc",
+    "DurationObjective",
     "FclStateValidityChecker",
     "Footprint",
     "Gains",
@@ -92,6 +94,7 @@ _MODULES = {
     "export.following": ("follow",),
     "maps": ("OccupancyMap", "load_dynobench", "load_map", "save_map"),
     "motion.laws": ("register_law",),
+    "ompl_plugin.duration_objective": ("DurationObjective",),
     "ompl_plugin.own_sampler": ("with_directed_sampler",),
     "ompl_plugin.propagators": ("TwoWheelPropagator",),
     "ompl_plugin.results": ("trajectory_from_path",),

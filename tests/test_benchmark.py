@@ -320,7 +320,7 @@ def test_no_planner_runs_with_the_sampler_or_the_model_of_another(
 @pytest.mark.slow
 def test_every_run_repeats_the_plan_with_its_seed(field: Scenario) -> None:
     seeds = (5, 3)
-    left_out = {"syclop-est", "cb-rrt-anytime"}  # a second to set up, and as syclop-rrt; in OMPL it ends when solved
+    left_out = {"syclop-est", "cb-rrt-anytime"}  # a second to set up, and as syclop-rrt; goes on
     names = [name for name in PLANNERS if name not in left_out]
     field = replace(field, planning=replace(field.planning, closed_loop=False))  # for all of them to share a space
     log = Experiment(field, {name: seeds for name in names}, "open").run(10.0)

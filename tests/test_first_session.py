@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -279,3 +280,12 @@ def load_draft_of_plan(room: Path, capsys: pytest.CaptureFixture[str]) -> Any:
     """The scenario that a plan in the map is verified against: that of ``cbrrt new`` with the same options."""
     (room / "same.yaml").write_text(run(capsys, "new", "room.yaml", *ASK)[1])
     return load_scenario("same.yaml")
+
+
+def test_a_goal_in_position_alone_is_arrived_at_at_rest_where_asked_for(
+    room: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(capsys, "plan", "room.yaml", *ASK, "--rest", "--seed", "1", "--trajectory", "t.csv")[0] == 0
+    end = Trajectory.load("t.csv").states[-1]
+    assert abs(end[3:]).max() <= REST_SPEED
+    assert math.hypot(end[0] - 3.2, end[1] - 1.5) < 0.25

@@ -43,7 +43,8 @@ else:
 OPEN = Scenario(name="open", world=World(Bounds((-5.0, -5.0), (5.0, 5.0))), start=State(-4.0, 0.0), goal=Goal(4.0, 0.0))
 BY_VELOCITIES = replace(OPEN, planning=PlanningSettings(closed_loop=False))
 """The same, with controls that are velocities for every planner."""
-OURS = [name for name, planner in PLANNERS.items() if planner.backend is not Backend.OMPL]
+OURS = [name for name, planner in PLANNERS.items() if planner.backend is not Backend.OMPL and not planner.is_anytime]
+"""Without the anytime one, which goes on until its time is over."""
 ALL = list(PLANNERS)
 MOST = [*OURS, "rrt", "est"]
 """All of ours, and two of OMPL's for comparison."""

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from cbrrt_ompl.ompl_plugin.anytime_planner import AnytimePlanner, Progress
 from cbrrt_ompl.ompl_plugin.binding import ob, ou
 from cbrrt_ompl.ompl_plugin.compiled_planner import CompiledPlanner
 from cbrrt_ompl.ompl_plugin.paper_planner import PaperPlanner
@@ -95,10 +96,15 @@ class Entrant(ob.Planner):  # type: ignore[misc]  # OMPL has no type information
 
     @property
     def samples(self) -> int:
-        """Samples drawn in this run; for OMPL's own planners the rounds of their main loop."""
+        """Samples drawn for this run's tree; for OMPL's own planners the rounds of their main loop."""
         if isinstance(self.planner, CompiledPlanner):
             return self.planner.search.samples if self.planner.search is not None else 0
         return self.planner.samples if isinstance(self.planner, PaperPlanner) else self._rounds
+
+    @property
+    def progress(self) -> list[Progress] | None:
+        """The solutions of this run, each better than the one before; None for planners that end with their first."""
+        return self.planner.progress if isinstance(self.planner, AnytimePlanner) else None
 
     @property
     def extension_attempts(self) -> int:
@@ -110,9 +116,7 @@ class Entrant(ob.Planner):  # type: ignore[misc]  # OMPL has no type information
     def _make(self, seed: int) -> Any:
         """A new planner."""
         si, name = self.getSpaceInformation(), self.getName()
-        if is_compiled(name):
-            return CompiledPlanner(si, self._scenario, name, seed)
-        made = make_planner(si, self._scenario, name)
+        made = make_planner(si, self._scenario, name, seed=seed)
         if isinstance(made, PaperPlanner):
             made.looks_around = False
         return made

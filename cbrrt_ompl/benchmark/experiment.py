@@ -10,7 +10,7 @@ from typing import Any
 
 from cbrrt_ompl.benchmark.columns import search_columns, trajectory_columns
 from cbrrt_ompl.benchmark.entrant import Entrant
-from cbrrt_ompl.benchmark.log import Log, PlannerLog, read_log
+from cbrrt_ompl.benchmark.log import Log, PlannerLog, Row, read_log
 from cbrrt_ompl.errors import InputError, Problem, SettingsError
 from cbrrt_ompl.motion.model import CLOSED_LOOP
 from cbrrt_ompl.ompl_plugin.binding import ot, ou
@@ -30,6 +30,9 @@ WARM_UP = 0.01
 
 PREFIX = "control_"
 """What OMPL's Benchmark puts before the names of control planners."""
+
+PROGRESS = ("time REAL", "best cost REAL")
+"""Columns of an anytime planner's progress: OMPL itself would ask for it in a thread without Python's lock."""
 
 PROPERTIES = "Properties of benchmarked planners:\n"
 """Line in OMPL's account of the set-up after which the planners follow."""
@@ -68,6 +71,7 @@ class Experiment:
         self._run = 0
         self._settings: dict[str, set[str]] = {}
         self._properties: dict[str, str] = {}
+        self._progress: dict[str, list[tuple[Row, ...]]] = {}
 
     def run(self, time_limit: float, memory_limit: float = MEMORY_LIMIT) -> Log:
         """Run all planners, one after the other.
@@ -128,6 +132,9 @@ class Experiment:
         ) | trajectory_columns(self._trajectory(), self._scenario)
         for column, value in columns.items():
             run[column] = value
+        if entrant.progress is not None:
+            rows = tuple((f"{row.time:.6f}", f"{row.cost:.9g}") for row in entrant.progress)
+            self._progress.setdefault(entrant.getName(), []).append(rows)
         self._run += 1
 
     def _trajectory(self) -> Trajectory | None:
@@ -142,8 +149,11 @@ class Experiment:
         return replace(log, setup=setup, planners=tuple(self._with_settings(planner) for planner in log.planners))
 
     def _with_settings(self, planner: PlannerLog) -> PlannerLog:
-        settings = {*planner.settings, *self._settings[planner.name.removeprefix(PREFIX)]}
-        return replace(planner, settings=tuple(sorted(settings)))
+        name = planner.name.removeprefix(PREFIX)
+        planner = replace(planner, settings=tuple(sorted({*planner.settings, *self._settings[name]})))
+        if name not in self._progress:
+            return planner
+        return replace(planner, progress_columns=PROGRESS, progress=tuple(self._progress[name]))
 
 
 def check_entries(scenario: Scenario, seeds: Mapping[str, Sequence[int]]) -> None:

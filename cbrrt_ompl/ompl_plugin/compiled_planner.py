@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from cbrrt_ompl.ompl_plugin.user_parts import Query, check_parts, is_same_part, 
 from cbrrt_ompl.ompl_plugin.warm_up import warm_up
 from cbrrt_ompl.planners.registry import planner_named, scenario_for
 from cbrrt_ompl.planners.search import Search
+from cbrrt_ompl.planners.warm_up import warm_up as warm_up_search
 from cbrrt_ompl.problem.settings import State
 from cbrrt_ompl.scenario.scenario import Scenario
 
@@ -48,6 +50,7 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
         super().__init__(si, name)
         self.search: Search | None = None
         self._scenario, self._seed = scenario_for(name, scenario), seed
+        self._starts: list[State] = []
         self._query: Query | None = None
         self._goal: tuple[Any, Any] = (None, None)
 
@@ -58,14 +61,15 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
             SettingsError: see :func:`cbrrt_ompl.ompl_plugin.user_parts.check_parts`.
         """
         warm_up()
+        warm_up_search()
         check_parts(self.getSpaceInformation(), self._scenario, self.getName())
         super().setup()
 
     def clear(self) -> None:
         """Forget the tree."""
         super().clear()
-        if self.search is not None and self._seed is not None:
-            self._seed += 1
+        if self.search is not None:
+            self._next_seed()
         self.search = None
 
     def solve(self, condition: Any, *interval: Any) -> Any:
@@ -81,17 +85,29 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
         should_stop = condition if callable(condition) else ob.timedPlannerTerminationCondition(float(condition))
         self._forget_what_has_changed(problem)
         if self.search is None:
-            starts = [start for start in self._query.starts if self._is_valid(start)] if self._query else []
-            if not starts:
+            self._starts = [start for start in self._query.starts if self._is_valid(start)] if self._query else []
+            if not self._starts:
                 return ob.PlannerStatus(ob.PlannerStatus.INVALID_START)
-            self.search = self._new_search(starts)
-        self.search.run(
-            lambda _: bool(should_stop()), self.search.samples + self._scenario.planning.filled().max_samples
-        )
+            self.search = self._new_search(self._starts)
+        self.search.run(lambda _: bool(should_stop()), self.search.samples + self._max_samples)
         if not self.search.has_reached_goal:
             return ob.PlannerStatus(ob.PlannerStatus.TIMEOUT)
-        problem.addSolutionPath(self._path(), False, 0.0, self.getName())
+        self._conclude(problem, lambda: bool(should_stop()))
         return ob.PlannerStatus(ob.PlannerStatus.EXACT_SOLUTION)
+
+    def _conclude(self, problem: Any, should_stop: Callable[[], bool]) -> None:
+        """Hand over the solution; what is left of the time may be used."""
+        problem.addSolutionPath(self._path(), False, 0.0, self.getName())
+
+    def _next_seed(self) -> None:
+        """Give the next tree another seed."""
+        if self._seed is not None:
+            self._seed += 1
+
+    @property
+    def _max_samples(self) -> int:
+        """Samples that a tree may draw at once."""
+        return self._scenario.planning.filled().max_samples
 
     def _forget_what_has_changed(self, problem: Any) -> None:
         """Drop the tree if it was grown for other starts, another goal or other parts."""

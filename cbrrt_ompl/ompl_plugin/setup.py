@@ -7,6 +7,7 @@ from typing import Any
 
 from cbrrt_ompl.motion.model import CLOSED_LOOP, STEERING, check_step
 from cbrrt_ompl.motion.records import Records
+from cbrrt_ompl.ompl_plugin.anytime_planner import AnytimePlanner
 from cbrrt_ompl.ompl_plugin.binding import ob, oc
 from cbrrt_ompl.ompl_plugin.compiled_methods import use_compiled_methods
 from cbrrt_ompl.ompl_plugin.compiled_planner import CompiledPlanner
@@ -117,7 +118,9 @@ def equip(si: Any, scenario: Scenario, planner: str, compiled: bool | None = Non
     return Equipment(propagator.model)
 
 
-def make_planner(si: Any, scenario: Scenario, planner: str, compiled: bool | None = None) -> Any:
+def make_planner(
+    si: Any, scenario: Scenario, planner: str, compiled: bool | None = None, seed: int | None = None
+) -> Any:
     """A planner under our name; for `cb-rrt` and `s-rrt` control::RRT, with the scenario's goal bias.
 
     Args:
@@ -125,10 +128,11 @@ def make_planner(si: Any, scenario: Scenario, planner: str, compiled: bool | Non
         scenario: bounds (for Syclop's grid), goal bias, and all that the compiled planners plan for.
         planner: a known planner's name.
         compiled: see :func:`make_setup`.
+        seed: of a compiled planner; None draws a fresh one.
     """
     row, scenario = planner_named(planner), scenario_for(planner, scenario)
     if row.backend is Backend.COMPILED:
-        return CompiledPlanner(si, scenario, planner)
+        return (AnytimePlanner if row.is_anytime else CompiledPlanner)(si, scenario, planner, seed)
     if row.backend is Backend.PLUGIN:
         return PaperPlanner(si, scenario, planner, compiled)
     if row.ompl_class.startswith("Syclop"):

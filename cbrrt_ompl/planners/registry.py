@@ -46,7 +46,7 @@ class Planner:
     is_robust: bool = False
     """Whether places are passed over the likelier, the more extensions from there have failed."""
     is_anytime: bool = False
-    """Whether it goes on after its first plan (in OMPL's own set-up and benchmark its first plan is all there is)."""
+    """Whether it goes on after its first plan."""
     ompl_class: str = "RRT"
     """Name of its class in ``ompl.control``."""
     defaults: FilledSettings = FilledSettings()
