@@ -24,6 +24,7 @@ from cbrrt_ompl.planners.growth import (
     grow,
 )
 from cbrrt_ompl.planners.nearest import KINDS, enlarged, make_index
+from cbrrt_ompl.planners.reachable import reachable_cells
 from cbrrt_ompl.planners.roll_out import STEPS
 from cbrrt_ompl.problem.robot import Footprint
 from cbrrt_ompl.problem.settings import State
@@ -72,12 +73,14 @@ class Search:
             seed: of the search's own generator; None draws a fresh one.
             goal_bias: fraction of samples that are the goal.
             neighbours: `grid`, `kd-tree` or `brute-force`.
-            robust: whether places are passed over the likelier, the more extensions from there have failed.
+            robust: whether places are passed over the likelier, the more extensions from there have failed, and samples
+                are drawn only where the robot may get to.
         """
         self.model = model
         self.has_reached_goal = False
         self._scene, self._bounds = world.scene(footprint), world.bounds
         self._rng = np.random.default_rng(seed)
+        self._cells = reachable_cells(self._scene, starts) if robust else None
         self._draws: NDArray[np.float64] = np.empty((0, ROBUST_DRAWS if robust else DRAWS))
         self._steps = record_array(1, STEPS)
         self._search = record_array(1, SEARCH)
@@ -134,6 +137,8 @@ class Search:
         """Draw the next random numbers, more at once each time."""
         rows, columns = self._draws.shape
         self._draws = self._rng.random((min(max(2 * rows, 256), DRAWS_AT_ONCE), columns))
+        if self._cells is not None:
+            self._draws[:, 1:3] = self._cells.place(self._draws[:, 1:3])
         self._search["drawn"] = 0
 
     def _make_room(self) -> None:
