@@ -56,6 +56,10 @@ def add_parser(commands: Commands) -> None:
         "--max-samples", type=count, metavar="N",
         help="samples of a plan at most, instead of the cycle's time: the same drive on every machine",
     )  # fmt: skip
+    parser.add_argument(
+        "--max-iterations", type=count, default=0, metavar="N",
+        help="Newton steps to improve each plan for, as 600 (default: plans are driven as they are)",
+    )  # fmt: skip
     add_output_files(parser, FILES)
     add_json(parser)
 
@@ -68,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
     from cbrrt_ompl.scenario.scenario import load_scenario
 
     scenario = load_scenario(arguments.scenario)
-    names = ("sensor_range", "cycle", "planner", "max_samples")
+    names = ("sensor_range", "cycle", "planner", "max_samples", "max_iterations")
     settings = DriveSettings(**{name: getattr(arguments, name) for name in names})
     hidden = None
     if arguments.unknown is not None:

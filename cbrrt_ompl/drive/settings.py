@@ -38,6 +38,8 @@ class DriveSettings:
     """Distance that the footprint keeps from all that is known [m]."""
     max_samples: int | None = None
     """Samples that a plan may take instead of the cycle's time: then a drive is the same on every machine."""
+    max_iterations: int = 0
+    """Newton steps to improve each plan for, with the plan before as another guess; 0 drives plans as they are."""
     tries: int = 6
     """Plans made while standing, each with twice the time (or samples) of the one before, before the robot gives up."""
     time_limit: float = 600.0
@@ -58,6 +60,8 @@ class DriveSettings:
             value = getattr(self, name)
             if value is not None and not (isinstance(value, int) and value >= 1):
                 problems.append(Problem(name, value, "a whole number of 1 or more"))
+        if not (isinstance(self.max_iterations, int) and self.max_iterations >= 0):
+            problems.append(Problem("max_iterations", self.max_iterations, "a whole number of 0 or more"))
         known = [name for name, row in PLANNERS.items() if row.steering is not Steering.RATES]
         if self.planner not in known:
             problems.append(Problem("planner", self.planner, f"one of {', '.join(known)}"))

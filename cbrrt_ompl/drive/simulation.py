@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 
 from cbrrt_ompl.collision.motion_check import is_free
 from cbrrt_ompl.collision.world import World
+from cbrrt_ompl.drive.improving import improved
 from cbrrt_ompl.drive.knowledge import Knowledge
 from cbrrt_ompl.drive.result import LATE, NO_ROOM, REACHED, STOPPED, UNSAFE, Cycle, DriveResult, Replan
 from cbrrt_ompl.drive.settings import DriveSettings, grown, needed_range
 from cbrrt_ompl.errors import Problem, ScenarioError, SettingsError
-from cbrrt_ompl.planning import plan, warm_up_planner
+from cbrrt_ompl.planning import plan, warm_up_improvement, warm_up_planner
 from cbrrt_ompl.problem.obstacles import Obstacle
 from cbrrt_ompl.problem.settings import State
 from cbrrt_ompl.scenario.scenario import Scenario
@@ -80,12 +81,15 @@ class Drive:
         self._knowledge = Knowledge(known, self.hidden)
         self._rng = np.random.default_rng(seed)
         self._driven, self._steps_driven = [_at_start(scenario.start)], 0
+        self._last: Trajectory | None = None  # the plan before, from the next look on
         self._plan: Trajectory | None = None  # the rest of it from now on; None while braking
         self._committed = self._driven[0].stopping_at(0.0, self._robot.limits, self._dt)
         self._failures = 0
         self.status = None if scenario.goal.violations(scenario.start) else REACHED
         self.cycles: list[Cycle] = []
         warm_up_planner(self.settings.planner)
+        if self.settings.max_iterations > 0:
+            warm_up_improvement()
         if not is_free(self._committed.states, self._dt, self.world.scene(self._robot.footprint)):
             expected = f"a state with {self.settings.margin:g} m of room (the margin), on the way to rest as well"
             raise ScenarioError(Problem("start", list(scenario.start), expected))
@@ -133,6 +137,8 @@ class Drive:
             self.status = STOPPED
             return
         began, looked_at = time.perf_counter(), self.time
+        if self._plan is not None:
+            self._last = _part(self._plan, self._cycle_steps, None, self._dt)
         seen = self._knowledge.look(*self.state[:2], self.settings.sensor_range)
         portions = 2**self._failures if stands else 1
         steps = portions * self._cycle_steps
@@ -194,12 +200,20 @@ class Drive:
             return record(NO_ROOM, 0, 0.0, None)
         result = plan(scenario, settings.planner, seed, search_limit)
         status, found = result.status, result.trajectory
+        if found is not None and settings.max_iterations > 0:
+            found = self._improved(found, scenario, search_limit - result.planning_time)
         if found is not None and settings.max_samples is None and time.perf_counter() - began > limit:
             status, found = LATE, None
         if found is not None and not self._commit(found):
             status, found = UNSAFE, None
         shown = None if found is None else replace(found, t=found.t + looked_at + limit)
         return record(status, result.samples, result.planning_time, shown)
+
+    def _improved(self, found: Trajectory, scenario: Scenario, time_limit: float) -> Trajectory:
+        """A plan made shorter, if that is free; what is left of the plan before is one of the guesses."""
+        last = self._last if self._last is not None and len(self._last) > 1 else None
+        better = improved(found, scenario, self.settings.max_iterations, max(time_limit, SHORTEST_SEARCH), last)
+        return better if self._is_free(better) else found
 
     def _commit(self, rest: Trajectory) -> bool:
         """Follow a plan from the next look on, if its first cycle and the braking after that are free."""

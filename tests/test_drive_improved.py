@@ -1,0 +1,49 @@
+"""Drives with improved plans: shorter, as safe, and the same on every run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cbrrt_ompl import Scenario, improve, load_scenario, plan
+from cbrrt_ompl.drive import DriveSettings, drive
+from cbrrt_ompl.drive.improving import on_whole_steps
+from cbrrt_ompl.errors import SettingsError
+
+
+@pytest.fixture(scope="module")
+def office(scenarios: Path) -> Scenario:
+    return load_scenario(scenarios / "office.yaml")
+
+
+def test_a_drive_with_improved_plans_is_shorter_safe_and_repeats_itself(office: Scenario) -> None:
+    plain, *better = (
+        drive(office, None, DriveSettings(sensor_range=2.5, max_samples=2000, max_iterations=steps), seed=1)
+        for steps in (0, 600, 600)
+    )
+    assert better[0].reached and better[0].verification.ok
+    assert better[0].smallest_clearance >= better[0].settings.margin
+    assert better[0].trajectory.duration < 0.8 * plain.trajectory.duration
+    assert better[0].trajectory == better[1].trajectory
+
+
+def test_an_improved_trajectory_has_rows_at_whole_steps_and_ends_where_it_did(office: Scenario) -> None:
+    """Also where it ends at speed in the middle of a step: it drives on to the end of that."""
+    first = plan(office, "cb-rrt-robust", seed=1).trajectory
+    better = improve(first, office, max_iterations=400)
+    rows = on_whole_steps(better, 0.05)
+    assert np.diff(rows.t) == pytest.approx(0.05)
+    assert better.duration <= rows.duration + 1e-9 < better.duration + 0.05 + 1e-9
+    along = rows.at(better.t)
+    assert np.hypot(*(along[:, :2] - better.poses[:, :2]).T).max() < 0.01
+    limits = office.robot.limits
+    assert np.abs(np.diff(rows.v)).max() <= 0.05 * limits.acceleration + 1e-9
+    assert np.abs(np.diff(rows.omega)).max() <= 0.05 * limits.angular_acceleration + 1e-9
+
+
+@pytest.mark.parametrize("steps", [-1, 0.5, "600"])
+def test_wrong_iterations_are_refused_by_name(steps: object) -> None:
+    with pytest.raises(SettingsError, match="max_iterations: got .* expected a whole number of 0 or more"):
+        DriveSettings(max_iterations=steps)  # type: ignore[arg-type]
