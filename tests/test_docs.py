@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import re
-import shlex
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -18,7 +17,6 @@ from test_package import tomllib
 from test_readme import blocks
 
 import cbrrt_ompl
-from cbrrt_ompl.cli import build_parser
 from cbrrt_ompl.planners.registry import PLANNERS
 from cbrrt_ompl.problem.robot import Gains, Limits
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
@@ -134,48 +132,11 @@ def test_the_pages_request_nothing_from_elsewhere(repository: Path) -> None:
     assert not [name for name in settings.get("extra_css", []) + settings.get("extra_javascript", []) if "//" in name]
 
 
-def test_the_commands_on_the_pages_exist(docs: Path) -> None:
-    text = "\n".join(path.read_text(encoding="utf-8").replace("\\\n", " ") for path in docs.glob("*.md"))
-    lines = [line.strip() for block in blocks(text, "console") for line in block.splitlines()]
-    commands = [
-        shlex.split(line.removeprefix("$ "), comments=True)[1:] for line in lines if line.startswith("$ cbrrt ")
-    ]
-    assert len(commands) > 5
-    for arguments in commands:
-        assert callable(build_parser().parse_args(arguments).run)
-
-
 def test_the_scenario_on_the_scenario_page_can_be_loaded(docs: Path, tmp_path: Path) -> None:
     (text,) = blocks((docs / "scenario.md").read_text(encoding="utf-8"), "yaml")
     path = tmp_path / "scenario.yaml"
     path.write_text(text, encoding="utf-8")
     assert len(load_scenario(path).world.obstacles) == 4
-
-
-@pytest.mark.parametrize(
-    "page",
-    [
-        pytest.param("getting-started.md", marks=pytest.mark.needs_ompl),
-        "own-map.md",
-        "robot.md",
-        "improve.md",
-        pytest.param("faq.md", marks=pytest.mark.needs_ompl),
-    ],
-)
-def test_the_python_on_the_pages_runs(repository: Path, docs: Path, tmp_path: Path, page: str) -> None:
-    code = "\n".join(blocks((docs / page).read_text(encoding="utf-8"), "python"))
-    environment = {**os.environ, "PYTHONPATH": str(repository)}
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120
-    )
-    assert done.returncode == 0, done.stderr
-    assert {
-        "getting-started.md": "Exact solution",
-        "own-map.md": "solved",
-        "robot.md": " poses",
-        "improve.md": " s, improved ",
-        "faq.md": "1 sampler made",
-    }[page] in done.stdout
 
 
 def test_the_set_up_and_the_law_on_the_page_on_ompl_run(repository: Path, docs: Path, tmp_path: Path) -> None:

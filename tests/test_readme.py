@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import re
 import shlex
@@ -10,9 +11,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from cbrrt_ompl.cli import build_parser
+from cbrrt_ompl.figures.animation import animate
+from cbrrt_ompl.figures.film import frame_times
+from cbrrt_ompl.figures.layout import DPI
+from cbrrt_ompl.planning import plan
 from cbrrt_ompl.scenario.scenario import load_scenario
 
 
@@ -47,25 +54,24 @@ def test_the_example_has_ten_lines_of_code(readme: str) -> None:
     assert len([line for line in example.splitlines() if line.strip()]) <= 10
 
 
-def test_the_scenario_can_be_loaded(readme: str, tmp_path: Path) -> None:
-    text, _ = blocks(readme, "yaml")
-    path = tmp_path / "scenario.yaml"
-    path.write_text(text, encoding="utf-8")
-    scenario = load_scenario(path)
-    assert scenario.name == "two-gaps"
-    assert len(scenario.world.obstacles) == 3
-
-
-def test_the_commands_exist(readme: str, repository: Path) -> None:
-    lines = [line.removeprefix("$ ") for block in blocks(readme, "console") for line in block.splitlines()]
-    commands = [shlex.split(line, comments=True) for line in lines]
-    assert {words[0] for words in commands} == {"make", "cbrrt"}
-    makefile = (repository / "Makefile").read_text(encoding="utf-8")
-    for program, *arguments in commands:
-        if program == "make":
-            assert re.search(rf"^{arguments[0]}:", makefile, flags=re.MULTILINE)
-        else:
-            assert callable(build_parser().parse_args(arguments).run)
+def test_the_picture_is_what_the_command_beside_it_makes(readme: str, repository: Path) -> None:
+    """Its last frame, drawn again from the command's scenario, planner and seed."""
+    picture, command = re.findall(r"!\[.*\]\((.*\.gif)\)", readme)[0], blocks(readme, "console")[0]
+    arguments = build_parser().parse_args(shlex.split(command.removeprefix("$ cbrrt "), comments=True))
+    scenario = load_scenario(arguments.scenario)
+    result = plan(scenario, arguments.planner, arguments.seed)
+    assert result.trajectory is not None
+    animation = animate(result.trajectory, scenario, result.tree)
+    frames = len(frame_times(result.trajectory))
+    animation._func(frames - 1)
+    buffer = io.BytesIO()
+    animation._fig.savefig(buffer, format="png", dpi=DPI)
+    with Image.open(repository / picture) as shown, Image.open(buffer) as drawn:
+        shown.seek(shown.n_frames - 1)
+        old, new = (np.asarray(image.convert("RGB"), dtype=float) for image in (shown, drawn))
+    assert old.shape == new.shape
+    others = np.abs(old - new).max(axis=2) > 80.0  # a GIF has few colours
+    assert others.mean() < 2e-3, "make it again with the command"
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/architecture.md", "docs/reproduction.md"])
@@ -83,4 +89,4 @@ def test_architecture_names_every_module(repository: Path) -> None:
 
 
 def test_the_picture_is_small(repository: Path) -> None:
-    assert (repository / "docs" / "images" / "paper_case1.gif").stat().st_size < 400_000
+    assert (repository / "docs" / "images" / "office.gif").stat().st_size < 1_000_000
