@@ -90,6 +90,7 @@ def test_a_gif_has_every_frame_and_shows_motion(footprint: Footprint, tmp_path: 
         for frame in range(len(moving)):
             image.seek(frame)
             pictures.append(np.asarray(image.convert("RGB"), dtype=int))
+    assert (pictures[0][0, 0] == 255).all(), "paper is white"
     assert all(np.abs(b - a).max() > 100 for a, b in zip(pictures, pictures[1:], strict=False))
     assert [path.name for path in tmp_path.iterdir()] == ["plan.gif"]
 

@@ -132,6 +132,9 @@ class _GifWriter(PillowWriter):
         """Write the file."""
         frames = [frame.convert("RGB") for frame in self._frames]
         palette = frames[-1].quantize(COLORS)
+        colors = np.array(palette.getpalette()).reshape(-1, 3)
+        colors[(colors >= 248).all(axis=1)] = 255  # Pillow's means, and its nearest colours, are not quite white
+        palette.putpalette(colors.ravel().tolist())
         self._frames = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
         super().finish()
 
