@@ -87,9 +87,7 @@ def test_the_code_of_a_page_runs_in_an_empty_folder(
         lay_out(block.mark.get("given", ""))
         if block.kind == "console":
             for line in commands_of(block.code):
-                allowed = (
-                    (0, 1) if line[0] == "drive" else (0,)
-                )  # plans come late on a slow machine
+                allowed = (0, 1) if line[0] == "drive" else (0,)  # plans come late on a slow machine
                 assert main(line) in allowed, (line, capsys.readouterr())
         elif block.kind == "python":
             exec(compile(block.code, page, "exec"), names)
