@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from cbrrt_ompl.errors import SettingsError, TrajectoryError
 from cbrrt_ompl.export.following import Disturbance, Follower, KanayamaLaw, error_of, follow
 from cbrrt_ompl.planning import plan
-from cbrrt_ompl.problem.robot import Limits
+from cbrrt_ompl.problem.robot import Gains, Limits
 from cbrrt_ompl.scenario.scenario import load_scenario
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 
@@ -19,7 +20,13 @@ ROUGH = Disturbance(slip=0.05, noise=0.005, heading_noise=math.radians(0.5))
 
 @pytest.fixture(scope="module", params=["office", "dock"])
 def trajectory(request: pytest.FixtureRequest) -> Trajectory:
-    found = plan(load_scenario(request.param), planner="cb-rrt-robust", seed=1).trajectory
+    scenario = load_scenario(request.param)
+    scenario = replace(
+        scenario,
+        robot=replace(scenario.robot, gains=Gains()),  # the paper's, as in the figures that docs/robot.md gives
+        planning=replace(scenario.planning, closed_loop=False, goal_bias=0.05),
+    )
+    found = plan(scenario, planner="cb-rrt-robust", seed=1).trajectory
     assert found is not None
     return found
 

@@ -140,7 +140,7 @@ def spread(
                 if states[r, c] != 0:
                     continue
                 states[r, c] = CLOSED
-                if _may_be_free(scene, places, c / columns, r / rows, rows, columns):
+                if _has_room(scene, places, c / columns, r / rows, rows, columns):
                     if count == len(waiting):
                         return False
                     states[r, c] = REACHED
@@ -150,7 +150,7 @@ def spread(
 
 
 @inner_kernel
-def _may_be_free(scene: Scene, places: int, across: float, up: float, rows: int, columns: int) -> bool:
+def _has_room(scene: Scene, places: int, across: float, up: float, rows: int, columns: int) -> bool:
     """Whether the disc inside the footprint may have room with its centre in a cell.
 
     Args:
