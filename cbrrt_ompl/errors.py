@@ -47,6 +47,9 @@ class _Missing:
     def __repr__(self) -> str:
         return "nothing"
 
+    def __reduce__(self) -> str:
+        return "MISSING"
+
 
 MISSING = _Missing()
 
@@ -73,6 +76,13 @@ class Refusal(Remark):
         return self.replace("{}", source) if "{}" in self else f"{self}: {source}"
 
 
+def _error_again(kind: type[InputError], text: str, attributes: dict[str, Any]) -> InputError:
+    """An error that another process raised."""
+    error = kind.__new__(kind, text)
+    error.__dict__.update(attributes)
+    return error
+
+
 class InputError(CbrrtError, ValueError):
     """Input that cannot be used: a file, or the arguments of a call.
 
@@ -86,6 +96,10 @@ class InputError(CbrrtError, ValueError):
         self.problems = [problems] if isinstance(problems, Problem) else list(problems)
         self.source = source
         super().__init__("\n".join(problem.told(source) for problem in self.problems))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled whole, for a parent process: an error is made anew from its arguments, which are a text here."""
+        return _error_again, (type(self), str(self), self.__dict__)
 
 
 class WorldError(InputError):

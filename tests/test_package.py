@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import json
+import pickle
 import re
 import subprocess
 import sys
@@ -16,6 +17,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 import cbrrt_ompl
+from cbrrt_ompl.errors import MISSING, InputError, Problem, ScenarioError, UnknownPlannerError
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -167,3 +169,19 @@ def test_the_lock_keeps_to_the_ranges_of_the_project(project: dict[str, Any], lo
         assert versions or wanted.name == "cbrrt-ompl", wanted.name
         if wanted.marker is None:
             assert all(wanted.specifier.contains(version) for version in versions), wanted.name
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        ScenarioError([Problem("goal", MISSING, "the goal"), Problem("start.x", "a", "a number")], "x.yaml"),
+        UnknownPlannerError("rtt", ["rrt"]),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+def test_errors_come_out_of_another_process_as_they_are(error: InputError) -> None:
+    """One was told as a crash of its process, since it could not be made again."""
+    again = pickle.loads(pickle.dumps(error))
+    assert type(again) is type(error)
+    assert str(again) == str(error)
+    assert vars(again) == vars(error)
