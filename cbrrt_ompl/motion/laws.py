@@ -121,7 +121,7 @@ def register_law(name: str, function: LawFunction) -> None:
 
 def known_laws() -> list[str]:
     """Names of all laws, sorted."""
-    return sorted([KANAYAMA, *_laws])
+    return sorted({KANAYAMA, *_SHIPPED, *_laws})
 
 
 def law_named(name: str) -> Law | None:
@@ -132,6 +132,8 @@ def law_named(name: str) -> Law | None:
     """
     if name == KANAYAMA:
         return None
+    if name not in _laws and name in _SHIPPED:
+        register_law(name, _SHIPPED[name])
     if name not in _laws:
         raise SettingsError(Problem("planning.law", name, f"one of {', '.join(known_laws())}"))
     return _laws[name]
@@ -334,4 +336,5 @@ def posq(error: tuple[float, float, float], limits: Any, gains: Any) -> tuple[fl
     return limits.v_max * math.tanh(3.8 * math.hypot(x, y)), 6.0 * alpha - phi
 
 
-register_law("posq", posq)
+_SHIPPED: dict[str, LawFunction] = {"posq": posq}
+"""Laws that come with the package; compiled when they are first asked for, which takes most of a second."""
