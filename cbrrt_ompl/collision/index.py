@@ -16,7 +16,6 @@ from cbrrt_ompl.collision.distances import point_piece
 from cbrrt_ompl.collision.pieces import Pieces
 from cbrrt_ompl.kernels import inner_kernel, kernel
 from cbrrt_ompl.motion.records import Record, Records, as_records, record_array
-from cbrrt_ompl.problem.obstacles import Bounds
 
 CELL = np.dtype(
     [
@@ -30,24 +29,6 @@ CELL = np.dtype(
     align=True,
 )
 """A square; its children follow each other: left below, right below, left above, right above."""
-
-PLAN = np.dtype(
-    [
-        ("x_min", np.float64),  # bounds, outside of which squares are left empty [m]
-        ("y_min", np.float64),
-        ("x_max", np.float64),
-        ("y_max", np.float64),
-        ("side", np.float64),  # of the whole [m]
-        ("levels", np.int64),  # above the root cells
-        ("parts", np.int64),  # pieces of the footprint, which are in no list
-        ("outer", np.float64),  # radius of a disc that holds the footprint [m]
-        ("inner", np.float64),  # radius of a disc about the same centre that the footprint holds [m]
-        ("finest", np.float64),  # radius down to which cells are split [m]
-        ("slack", np.float64),  # added to all distances for rounding [m]
-    ],
-    align=True,
-)
-"""What is split, and how far."""
 
 SQUARE = np.dtype(
     [
@@ -92,57 +73,57 @@ MOST_ROOTS = 8
 """Levels of root cells at most: 256 x 256."""
 
 
-def build_index(
-    world: Pieces,
-    parts: int,
-    bounds: Bounds,
-    middle: tuple[float, float],
-    side: float,
-    outer: float,
-    inner: float,
-) -> tuple[Records, NDArray[np.int32], int]:
+def build_index(world: Pieces, frame: Record) -> tuple[Records, NDArray[np.int32], int]:
     """Quadtrees over a square that holds the bounds.
 
     Args:
         world: pieces of the footprint, then those of the obstacles.
-        parts: how many of the pieces belong to the footprint.
-        bounds: the walls.
-        middle: centre of the square [m].
-        side: of the square [m].
-        outer: radius of a disc that holds the footprint [m].
-        inner: radius of a disc about the same centre that the footprint holds [m].
+        frame: bounds and footprint, a record of type :data:`cbrrt_ompl.collision.scene.FRAME` without the roots.
 
     Returns:
         The cells, records of type `CELL`; the rows of the pieces in the lists of the leaves; and the number of root
         cells along a side of the square.
     """
-    obstacles = len(world.pieces) - parts
+    obstacles = len(world.pieces) - frame["parts"]
     levels = min(MOST_ROOTS, 2 + math.ceil(0.5 * math.log2(obstacles + 1.0)))
-    plan = record_array(1, PLAN)
-    plan[0] = (
-        (*bounds.min, *bounds.max, side, levels, parts, outer, inner)
-        + (max(FINEST, FINEST_OF_SLACK * (outer - inner)), SLACK * side)
-    )  # fmt: skip
+    side = side_of(frame)
+    middle = 0.5 * (frame["x_min"] + frame["x_min"] + side), 0.5 * (frame["y_min"] + frame["y_min"] + side)
     room = 16 * (4**levels + obstacles)
     while True:
         cells, listed = record_array(room, CELL), np.empty(room, dtype=np.int32)
         candidates, distances = np.empty(room, dtype=np.int32), np.empty(room)
-        candidates[:obstacles], distances[:obstacles] = np.arange(parts, len(world.pieces)), -math.inf
+        candidates[:obstacles], distances[:obstacles] = np.arange(frame["parts"], len(world.pieces)), -math.inf
         squares = record_array(MOST_SQUARES, SQUARE)
         squares[0] = (*middle, math.inf, 0, 0, 0, 0, obstacles)
         used, count = _build(
-            as_records(world.pieces), as_records(world.corners), plan[0], cells, listed, squares, candidates, distances
+            as_records(world.pieces),
+            as_records(world.corners),
+            frame,
+            side,
+            levels,
+            cells,
+            listed,
+            squares,
+            candidates,
+            distances,
         )
         if used > 0:
             return cells[:used].copy(), listed[:count].copy(), 2**levels
         room *= 4
 
 
+def side_of(frame: Record) -> float:
+    """Side of the square over the bounds [m]."""
+    return float(max(frame["x_max"] - frame["x_min"], frame["y_max"] - frame["y_min"]))
+
+
 @kernel
 def _build(
     pieces: Records,
     corners: Records,
-    plan: Record,
+    frame: Record,
+    side_of_all: float,
+    levels: int,
     cells: Records,
     listed: NDArray[np.int32],
     squares: Records,
@@ -154,7 +135,9 @@ def _build(
     Args:
         pieces: all pieces.
         corners: what polygons among them refer to.
-        plan: a record of type `PLAN`.
+        frame: see :func:`build_index`.
+        side_of_all: of the whole [m].
+        levels: above the root cells.
         cells: room for the cells, zeros.
         listed: room for the numbers of the pieces in the lists of the leaves.
         squares: room for squares that wait, the first of which is the whole; records of type `SQUARE`.
@@ -164,22 +147,23 @@ def _build(
     Returns:
         How many cells and entries of lists there are; (0, 0) where they need more room.
     """
-    roots = 1 << plan.levels
+    roots, slack = 1 << levels, SLACK * side_of_all
+    finest = max(FINEST, FINEST_OF_SLACK * (frame.outer - frame.inner))
     used, count = roots * roots, 0
     waiting = 1
     while waiting > 0:
         waiting -= 1
         square = squares[waiting]
         level, column, row, x, y = square.level, square.column, square.row, square.x, square.y
-        side = plan.side / 2.0**level
+        side = side_of_all / 2.0**level
         radius = math.sqrt(0.5) * side
-        if x + radius < plan.x_min or x - radius > plan.x_max or y + radius < plan.y_min or y - radius > plan.y_max:
+        if x + radius < frame.x_min or x - radius > frame.x_max or y + radius < frame.y_min or y - radius > frame.y_max:
             continue
         first, start = square.first, square.first + square.count
         if start + square.count > len(candidates) or count + square.count > len(listed) or used + 4 > len(cells):
             return 0, 0
         # A piece is as far from here as from the middle of the square around, give or take the radius.
-        spread = 2.0 * radius + plan.outer - plan.inner + plan.slack
+        spread = 2.0 * radius + frame.outer - frame.inner + slack
         limit = square.clearance + radius + spread
         nearest = math.inf
         found = start
@@ -192,7 +176,7 @@ def _build(
                 if distance <= limit:
                     candidates[found], distances[found] = candidates[k], distance
                     found += 1
-        if nearest + radius + plan.slack < plan.inner:  # all of the square is in collision with the nearest
+        if nearest + radius + slack < frame.inner:  # all of the square is in collision with the nearest
             limit = nearest
         end = start
         for k in range(start, found):
@@ -200,20 +184,20 @@ def _build(
                 candidates[end], distances[end] = candidates[k], distances[k]
                 end += 1
         is_full = count > MOST_LISTED + 8 * len(pieces)
-        if is_full or not _is_worth_splitting(plan, nearest, radius, end - start):
+        if is_full or not _is_worth_splitting(frame, finest, nearest, radius, end - start):
             for k in range(start, end):
                 listed[count + k - start] = candidates[k]
-            width = 1 << max(plan.levels - level, 0)  # root cells that this leaf stands for
+            width = 1 << max(levels - level, 0)  # root cells that this leaf stands for
             for above in range(width):
                 for right in range(width):
-                    cell = column if level > plan.levels else (row * width + above) * roots + column * width + right
+                    cell = column if level > levels else (row * width + above) * roots + column * width + right
                     cells[cell].x, cells[cell].y, cells[cell].clearance = x, y, nearest
                     cells[cell].first, cells[cell].count = count, end - start
             count += end - start
             continue
         child = 0
-        if level >= plan.levels:
-            cell = row * roots + column if level == plan.levels else column
+        if level >= levels:
+            cell = row * roots + column if level == levels else column
             cells[cell].x, cells[cell].y, cells[cell].clearance, cells[cell].child = x, y, nearest, used
             child = used
             used += 4
@@ -228,18 +212,19 @@ def _build(
 
 
 @inner_kernel
-def _is_worth_splitting(plan: Record, clearance: float, radius: float, length: int) -> bool:
+def _is_worth_splitting(frame: Record, finest: float, clearance: float, radius: float, length: int) -> bool:
     """Whether the children of a cell answer faster than the cell.
 
     Args:
-        plan: a record of type `PLAN`.
+        frame: see :func:`build_index`.
+        finest: radius down to which cells are split [m].
         clearance: distance of its centre from everything [m].
         radius: of the circle around it [m].
         length: pieces in its list.
     """
-    if length == 0 or clearance + radius < plan.inner:
+    if length == 0 or clearance + radius < frame.inner:
         return False
-    room = clearance - plan.outer
+    room = clearance - frame.outer
     if radius > room:  # somewhere in the cell pieces have to be looked at
-        return length > LONG_LIST and 0.5 * radius > plan.finest
+        return length > LONG_LIST and 0.5 * radius > finest
     return radius > GOOD_BOUND * room and radius > COARSEST

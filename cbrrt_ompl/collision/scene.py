@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from cbrrt_ompl.collision.index import build_index
+from cbrrt_ompl.collision.index import build_index, side_of
 from cbrrt_ompl.collision.pieces import Pieces, footprint_pieces, join
 from cbrrt_ompl.motion.records import Records, as_records, record_array
 from cbrrt_ompl.problem.obstacles import Bounds
@@ -71,11 +71,9 @@ def make_scene(bounds: Bounds, world: Pieces, footprint: Footprint) -> Scene:
     f["reach"] = 0.0 if footprint.is_round else footprint.circumscribed_radius
     own = footprint_pieces(footprint, center)
     f["parts"] = len(own.pieces)
-    side = max(bounds.size)
-    middle = (0.5 * (bounds.min[0] + bounds.min[0] + side), 0.5 * (bounds.min[1] + bounds.min[1] + side))
     together = join((own, world))
-    cells, lists, roots = build_index(together, len(own.pieces), bounds, middle, side, f["outer"], f["inner"])
-    f["roots"], f["roots_per_metre"] = roots, roots / side
+    cells, lists, roots = build_index(together, f)
+    f["roots"], f["roots_per_metre"] = roots, roots / side_of(f)
     return Scene(frame, cells, lists, as_records(together.pieces), as_records(together.corners))
 
 

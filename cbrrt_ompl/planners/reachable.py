@@ -27,9 +27,6 @@ MOST_IN_GRID = 4_000_000
 WORTH_IT = 0.5
 """Fraction of the bounds above which samples are drawn everywhere."""
 
-TINY = 1e-9
-"""In place of the radius of a point, for which no cell is closed [m]."""
-
 REACHED, CLOSED = 1, 2
 """States of cells that have been looked at."""
 
@@ -68,11 +65,13 @@ def reachable_cells(scene: Scene, starts: Sequence[State]) -> ReachableCells | N
         starts: where the robot is.
     """
     frame = scene.frame[0]
+    if not frame["inner"] > 0.0:
+        return None
     corner, far = np.array([frame["y_min"], frame["x_min"]]), np.array([frame["y_max"], frame["x_max"]])
     centers = np.array([_center(frame, start)[::-1] for start in starts])  # (n, 2)
     places, found, reached = COARSE, 0, None
     while places > 0 and 16 * found <= MOST_CELLS:
-        shape = np.ceil((far - corner) / (max(frame["inner"], TINY) * places))
+        shape = np.ceil((far - corner) / (frame["inner"] * places))
         if shape.prod() > MOST_IN_GRID:
             break
         cells = np.clip((centers - corner) / (far - corner) * shape, 0, shape - 1).astype(np.int64)
