@@ -2,7 +2,7 @@
 
 import re
 
-ROLE = re.compile(r":(?:func|class|meth|mod):(?=<code>)")
+ROLE = re.compile(r":(?:attr|class|data|exc|func|meth|mod):(?=<code>)")
 
 
 def on_page_content(html: str, **_: object) -> str:

@@ -22,7 +22,8 @@ from cbrrt_ompl.cli import build_parser, main
 from cbrrt_ompl.figures import film
 
 REPOSITORY = Path(__file__).resolve().parent.parent
-PAGES = sorted(str(path.relative_to(REPOSITORY)) for path in (REPOSITORY / "README.md", *REPOSITORY.glob("docs/*.md")))
+_FILES = (REPOSITORY / "README.md", *REPOSITORY.glob("docs/**/*.md"))
+PAGES = sorted(str(path.relative_to(REPOSITORY)) for path in _FILES)
 
 BLOCK = re.compile(
     r"(?:^ *<!-- (?P<mark>[^>]*) -->\s*)?^(?P<in> *)```(?P<kind>\w+)\n(?P<code>.*?)^(?P=in)```$",

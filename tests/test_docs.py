@@ -106,30 +106,71 @@ def numbers_agree(stated: Any, value: Any, unit: float) -> bool:
     return all(one * unit == pytest.approx(other) for one, other in pairs)
 
 
-def test_every_public_name_is_on_the_python_page(docs: Path) -> None:
-    documented = re.findall(r"^::: (\S+)$", (docs / "api.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
-    names = {entry.rpartition(".")[2] for entry in documented}
-    assert set(cbrrt_ompl.__all__) - {"__version__"} <= names
+def documented(docs: Path) -> dict[str, list[str]]:
+    """What each page on Python documents, by the name of the page."""
+    pages = {path.name: path.read_text(encoding="utf-8") for path in docs.glob("api/*.md")}
+    return {name: re.findall(r"^::: (\S+)$", text, flags=re.MULTILINE) for name, text in pages.items()}
 
 
-def test_the_pages_build_without_a_warning(repository: Path, tmp_path: Path) -> None:
-    """Also checks the links between the pages, and that every page is in the navigation."""
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path)]
+def test_every_public_name_is_on_one_page_on_python(docs: Path) -> None:
+    entries = sorted(entry.rpartition(".")[2] for page in documented(docs).values() for entry in page)
+    assert len(entries) == len(set(entries))
+    assert set(cbrrt_ompl.__all__) - {"__version__"} <= set(entries)
+
+
+def test_the_index_of_python_leads_to_every_documented_name(docs: Path) -> None:
+    rows = re.findall(
+        r"^\| \[.*\]\((\S+)\) \| (.*) \|$", (docs / "api" / "index.md").read_text("utf-8"), flags=re.MULTILINE
+    )
+    links = {page: re.findall(r"\]\[(\S+?)\]", names) for page, names in rows}
+    entries = {
+        name: [entry for entry in page if entry != "cbrrt_ompl.figures"] for name, page in documented(docs).items()
+    }
+    assert links == {name: page for name, page in entries.items() if page}
+
+
+@pytest.fixture(scope="module")
+def site(repository: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The pages, built without a warning: all links lead somewhere, and every page is in the navigation."""
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
     environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
     done = subprocess.run(
         command, cwd=repository, env=environment, capture_output=True, text=True, timeout=120, check=False
     )
     assert done.returncode == 0, done.stderr
     assert "WARNING" not in done.stderr
-    page = (tmp_path / "api.html").read_text(encoding="utf-8")
-    assert 'id="cbrrt_ompl.planning.plan"' in page
-    assert not re.search(r":(?:func|class|meth):", page)
+    return folder
 
 
-def test_the_pages_request_nothing_from_elsewhere(repository: Path) -> None:
-    settings = yaml.safe_load((repository / "mkdocs.yml").read_text(encoding="utf-8"))
-    assert settings["theme"]["font"] is False
-    assert not [name for name in settings.get("extra_css", []) + settings.get("extra_javascript", []) if "//" in name]
+def test_the_pages_on_python_show_signatures_and_no_markup(site: Path) -> None:
+    assert 'id="cbrrt_ompl.planning.plan"' in (site / "api" / "planning.html").read_text(encoding="utf-8")
+    for page in site.glob("api/*.html"):
+        assert not re.search(r":(?:func|class|data|meth|mod):", page.read_text(encoding="utf-8")), page
+
+
+def test_a_result_that_is_told_in_two_lines_is_one_result(site: Path) -> None:
+    """A second line of text under *Returns* used to become a second value."""
+    page = (site / "api" / "trajectories.html").read_text(encoding="utf-8")
+    method = page.partition('id="cbrrt_ompl.trajectory.trajectory.Trajectory.resampled"')[2]
+    returns = re.search(r"Returns:.*?<ul>(.*?)</ul>", method, flags=re.DOTALL)
+    assert returns is not None and returns[1].count("<li ") + returns[1].count("<li>") == 1
+    assert "none is where it comes to rest" in returns[1]
+
+
+def test_the_pages_request_nothing_from_elsewhere(site: Path) -> None:
+    for page in site.rglob("*.html"):
+        text = page.read_text(encoding="utf-8")
+        sources = re.findall(r"<(?:script|img|iframe)\b[^>]*\bsrc=[\"']?([^\"' >]+)", text)
+        sources += re.findall(r"<link\b[^>]*\brel=[\"']?stylesheet[^>]*\bhref=[\"']?([^\"' >]+)", text)
+        assert sources and not [source for source in sources if "//" in source], page
+
+
+def test_a_search_from_disk_finds_its_index_and_what_stands_for_a_worker(site: Path) -> None:
+    """Browsers start no worker and read no JSON for a page from disk."""
+    assert (site / "search" / "search_index.js").read_text(encoding="utf-8").startswith("var __index = {")
+    assert 'src="../iframe-worker.js"' in (site / "api" / "errors.html").read_text(encoding="utf-8")
+    assert (site / "iframe-worker.js").is_file()
 
 
 def test_the_scenario_on_the_scenario_page_can_be_loaded(docs: Path, tmp_path: Path) -> None:
