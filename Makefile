@@ -5,13 +5,14 @@ BIN = $(VENV)/bin
 LOCK := requirements.lock
 UV := uv>=0.9,<1
 
-.PHONY: help demo test test-latest coverage docs lock clean
+.PHONY: help demo test test-latest coverage docs pictures lock clean
 help:
 	@echo "make demo   install into $(VENV) and plan both scenes of the paper and measure it again, in short"
 	@echo "make test   install into $(VENV) and run every check: ruff, mypy, import-linter, pytest"
 	@echo "make test-latest   the same in .venv-latest, with the newest versions instead of those in $(LOCK)"
 	@echo "make coverage   run pytest, and again with kernels in plain Python, and list the lines that never ran"
 	@echo "make docs   install into $(VENV) and build the pages of docs/ into site/, without a warning"
+	@echo "make pictures   run the commands of docs/gallery.md and make its pictures anew"
 	@echo "make lock   write the newest versions for Python 3.10 to 3.14 into $(LOCK)"
 	@echo "make clean  remove $(VENV), .venv-latest, demo/, site/ and all caches"
 
@@ -44,6 +45,9 @@ coverage: $(VENV)/test.stamp
 
 docs: $(VENV)/docs.stamp
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
+pictures: $(VENV)/docs.stamp
+	$(BIN)/python docs/pictures.py
 
 $(VENV)/demo.stamp: EXTRA :=
 $(VENV)/test.stamp: EXTRA := [test]

@@ -173,6 +173,27 @@ def test_a_search_from_disk_finds_its_index_and_what_stands_for_a_worker(site: P
     assert (site / "iframe-worker.js").is_file()
 
 
+def test_every_picture_is_written_by_a_command_above_it(docs: Path) -> None:
+    page = (docs / "gallery.md").read_text(encoding="utf-8")
+    pictures = list(re.finditer(r"\]\(images/(\S+?)\)", page))
+    for picture in pictures:
+        name, above = picture[1], page[: picture.start()].rpartition("\n## ")[2]
+        chart = re.fullmatch(r"(?:success|boxes)_(\w+)\.png", name)
+        expected = (
+            rf"cbrrt bench {chart[1]} .*\n.*cbrrt report"
+            if chart
+            else rf"(?:--figure |--animation |savefig\(\")\b{name}"
+        )
+        assert re.search(expected, above), name
+    assert {picture[1] for picture in pictures} == {path.name for path in docs.glob("images/*")} - {"office.gif"}
+
+
+def test_pictures_are_small_enough_to_keep(docs: Path) -> None:
+    sizes = {path.name: path.stat().st_size for path in docs.glob("images/*")}
+    assert {name: size for name, size in sizes.items() if name.endswith(".png") and size > 150_000} == {}
+    assert sum(sizes.values()) < 2_000_000
+
+
 def test_the_scenario_on_the_scenario_page_can_be_loaded(docs: Path, tmp_path: Path) -> None:
     (text,) = blocks((docs / "scenario.md").read_text(encoding="utf-8"), "yaml")
     path = tmp_path / "scenario.yaml"
