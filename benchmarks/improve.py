@@ -1,12 +1,15 @@
 """How good trajectories are after some milliseconds of CPU time: the anytime planner against what was published.
 
-dynobench: second-order unicycles, with the tolerance for optimisers, at the limits of the file, at 0.45 m/s and rad/s
-(which the published solutions keep), and forward only. Maps: a TurtleBot3 Waffle Pi between random free poses, against
-a true lower bound on the duration (benchmarks/lower_bound.py). BARN: a Jackal. Grid: a Jackal that arrives with a
-heading and at rest, its path against the shortest one over the cells and their eight neighbours. Kernels are warm and
-worlds known: the time of compilation and of a world's distance field is not in the table. Nothing is downloaded.
+dynobench: unicycles of first or second order, with the tolerance for optimisers, at the limits of the file, at 0.45 m/s
+and rad/s (which the published solutions of second order keep), and forward only. Maps: a TurtleBot3 Waffle Pi between
+random free poses, against a true lower bound on the duration (benchmarks/lower_bound.py). BARN: a Jackal. Grid: a
+Jackal that arrives with a heading and at rest, its path against the shortest one over the cells and their eight
+neighbours. Kernels are warm and worlds known: the time of compilation and of a world's distance field is not in the
+table. Nothing is downloaded.
 
     python benchmarks/improve.py --dynobench bugtrap_0.yaml kink_0.yaml --model unicycle2_v0.yaml --seeds 100
+    python benchmarks/improve.py --dynobench unicycle1_kink_0.yaml --model unicycle1_v0.yaml
+    python benchmarks/improve.py --dynobench kink_0.yaml --model unicycle2_v0.yaml --clearance 0.029
     python benchmarks/improve.py --maps depot.yaml tb3_sandbox.yaml --pairs 100 --budget 100
     python benchmarks/improve.py --barn world_0.csv --seeds 10 --budget 200
     python benchmarks/improve.py --grid 100by100_10.yaml --pairs 50 --budget 150
@@ -34,7 +37,14 @@ from cbrrt_ompl.planners.registry import PLANNERS
 
 PLANNER = next(name for name, row in PLANNERS.items() if row.is_anytime)
 
-PUBLISHED = {"bugtrap_0": 25.1, "kink_0": 17.7, "parallelpark_0": 5.8}
+PUBLISHED = {
+    "bugtrap_0": 25.1,
+    "kink_0": 17.7,
+    "parallelpark_0": 5.8,
+    "unicycle1_bugtrap_0": 20.7,
+    "unicycle1_kink_0": 13.2,
+    "unicycle1_parallelpark_0": 3.1,
+}
 """Durations of iDb-A* (Ortiz-Haro et al., "iDb-A*: iterative search and optimization for optimal kinodynamic motion
 planning", IEEE Transactions on Robotics, 2024) [s]."""
 
@@ -104,14 +114,23 @@ def report(
     )
 
 
-def dynobench_cases(path: Path, model: Path) -> Iterator[tuple[str, Scenario]]:
-    """A problem at the limits of the model, at those that the published solutions keep, and forward only."""
-    scenario = load_dynobench(path, model, tolerance=0.03)
+def dynobench_cases(path: Path, model: Path, clearance: float) -> Iterator[tuple[str, Scenario]]:
+    """A problem at the limits of the model, at those that the published solutions keep, and forward only.
+
+    Args:
+        path: file of the problem.
+        model: file of the robot.
+        clearance: distance to keep [m].
+    """
+    scenario, forward_only = (
+        replace(found, planning=replace(found.planning, clearance=clearance))
+        for found in (load_dynobench(path, model, forward_only=way, tolerance=0.03) for way in (False, True))
+    )
     top = PUBLISHED_SPEED
     slower = scenario.robot.limits._replace(v_min=-top, v_max=top, omega_min=-top, omega_max=top)
     yield path.stem, scenario
     yield f"{path.stem} at {top}", replace(scenario, robot=replace(scenario.robot, limits=slower))
-    yield f"{path.stem} forward only", load_dynobench(path, model, forward_only=True, tolerance=0.03)
+    yield f"{path.stem} forward only", forward_only
 
 
 def grid_scenarios(path: Path, pairs: int) -> Iterator[tuple[Scenario, float]]:
@@ -153,6 +172,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--dynobench", type=Path, nargs="*", default=[], help="problems of dynobench's")
     parser.add_argument("--model", type=Path, help="the model of dynobench's robot")
+    parser.add_argument("--clearance", type=float, default=0.0, help="distance to keep in dynobench's problems [m]")
     parser.add_argument("--maps", type=Path, nargs="*", default=[], help="maps in which the TurtleBot3 plans")
     parser.add_argument("--barn", type=Path, nargs="*", default=[], help="CSV files of discs in which the Jackal plans")
     parser.add_argument("--grid", type=Path, nargs="*", default=[], help="maps in which the Jackal arrives at rest")
@@ -162,7 +182,7 @@ def main() -> None:
     arguments = parser.parse_args()
     budget = 1e-3 * arguments.budget
     for path in arguments.dynobench:
-        for name, scenario in dynobench_cases(path, arguments.model):
+        for name, scenario in dynobench_cases(path, arguments.model, arguments.clearance):
             report(f"{name} [s]", [scenario] * arguments.seeds, budget, [1.0] * arguments.seeds)
         print(f"{path.stem} published: {PUBLISHED.get(path.stem, math.nan)} s")
     for path in arguments.maps:

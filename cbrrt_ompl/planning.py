@@ -15,7 +15,7 @@ import numpy as np
 from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.collision.free_poses import nearest_free_pose
 from cbrrt_ompl.errors import Problem, SettingsError
-from cbrrt_ompl.motion.model import ROOM, STEERING, check_step, make_model
+from cbrrt_ompl.motion.model import ROOM, check_step, jumps, make_model
 from cbrrt_ompl.ompl_plugin.availability import check_ompl, has_ompl
 from cbrrt_ompl.optimise.anytime import further_guesses, robust_search
 from cbrrt_ompl.optimise.improving import Found, Improver, check_improvement, geodesic_guesses
@@ -173,7 +173,7 @@ def plan(
         max_iterations,
         callback,
         should_stop,
-        is_kinematic=law_of(planner, scenario.planning) == STEERING,
+        is_kinematic=jumps(law_of(planner, scenario.planning), scenario.robot),
     )
     budget = math.inf if improve_for is None else improve_for
     if is_anytime:

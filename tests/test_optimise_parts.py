@@ -183,15 +183,19 @@ def test_there_is_no_geodesic_through_a_closed_wall() -> None:
     assert geodesic(Scenario(name="closed", world=world, start=State(1.0, 1.0), goal=Goal(5.0, 1.0))) is None
 
 
-def test_a_refined_guess_is_the_same_motion() -> None:
+@pytest.mark.parametrize("is_kinematic", [False, True], ids=["dynamic", "kinematic"])
+def test_a_refined_guess_is_the_same_motion(is_kinematic: bool) -> None:
     scenario = Scenario(name="open", world=OPEN, start=State(1.0, 1.0, 1.0), goal=Goal(8.0, 3.0, tolerance=0.1))
     path = geodesic(scenario)
     assert path is not None
-    transcription = Transcription(scenario, Objective())
+    transcription = Transcription(scenario, Objective(), is_kinematic=is_kinematic)
     guess = guess_along(path, scenario, AHEAD, "ahead")
     n = len(guess.states)
     solution = transcription.solve(guess, np.zeros(n), np.ones(n), 0.1, 1e-4, lambda done: 200 - done).guess
-    coarse, fine = transcription.trajectory(solution), transcription.trajectory(refined(solution))
+    finer = refined(solution, is_kinematic=is_kinematic)
+    coarse, fine = transcription.trajectory(solution), transcription.trajectory(finer)
+    driven = fine.at(np.arange(len(finer.states)) * finer.states[0, -1] * (1.0 - 1e-9))
+    assert np.abs(driven[1:, 2:] - finer.states[1:, 2:5]).max() < 2e-3  # heading and velocities
     assert fine.duration == pytest.approx(coarse.duration)
     assert fine.states[-1] == pytest.approx(coarse.states[-1], abs=1e-5)
     again = guess_from_trajectory(coarse, scenario.robot.limits, "again")

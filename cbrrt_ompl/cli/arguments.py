@@ -7,12 +7,16 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 from cbrrt_ompl.errors import Problem
 
 if TYPE_CHECKING:
+    from cbrrt_ompl.problem.robot import Robot
+    from cbrrt_ompl.trajectory.track import Track
     from cbrrt_ompl.trajectory.trajectory import Trajectory
+
+Rows = TypeVar("Rows", bound="Trajectory | Track")
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 """What the parsers of commands are added to."""
@@ -94,12 +98,17 @@ def add_map(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scenario", type=Path, metavar="MAP", help=text)
 
 
-def load_trajectory(arguments: argparse.Namespace) -> Trajectory:
-    """The trajectory file of a command line, kinematic where the file or ``--kinematic`` says so."""
+def load_trajectory(arguments: argparse.Namespace, robot: Robot | None) -> Trajectory:
+    """The trajectory file of a command line, see :func:`as_kinematic`."""
     from cbrrt_ompl.trajectory.trajectory import Trajectory
 
-    trajectory = Trajectory.load(arguments.trajectory)
-    return replace(trajectory, kinematic=True) if arguments.kinematic else trajectory
+    return as_kinematic(Trajectory.load(arguments.trajectory), arguments, robot)
+
+
+def as_kinematic(rows: Rows, arguments: argparse.Namespace, robot: Robot | None) -> Rows:
+    """What a file holds, kinematic where the file or ``--kinematic`` says so or the robot is of first order."""
+    is_kinematic = arguments.kinematic or (robot is not None and robot.limits.is_first_order)
+    return replace(rows, kinematic=True) if is_kinematic else rows
 
 
 def seconds(text: str) -> float:

@@ -43,7 +43,8 @@ def run(arguments: argparse.Namespace) -> int:
     from cbrrt_ompl.optimise import Found, improve
     from cbrrt_ompl.scenario.scenario import load_scenario
 
-    scenario, given = load_scenario(arguments.scenario), load_trajectory(arguments)
+    scenario = load_scenario(arguments.scenario)
+    given = load_trajectory(arguments, scenario.robot)
     warm_up(None, improves=True)
     history: list[Found] = []
     limits = {"time_limit": arguments.time_limit, "max_iterations": arguments.max_iterations}

@@ -42,8 +42,9 @@ def run(arguments: argparse.Namespace) -> int:
     from cbrrt_ompl.figures.style import legend_above
     from cbrrt_ompl.scenario.maps.loading import load_map
 
-    trajectory = None if arguments.trajectory is None else load_trajectory(arguments)
     draft = _draft(arguments)
+    robot = None if draft is None else draft.robot
+    trajectory = None if arguments.trajectory is None else load_trajectory(arguments, robot)
     grid = load_map(**_map_of(arguments, draft)) if draft is None or draft.map is not None else None
     print_remarks(grid)
     bounds = draft.world.bounds if draft is not None else grid.bounds() if grid is not None else None

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cbrrt_ompl.cli.arguments import Commands, add_command, add_json, add_scenario, tolerance
+from cbrrt_ompl.cli.arguments import Commands, add_command, add_json, add_scenario, as_kinematic, tolerance
 from cbrrt_ompl.cli.exit_codes import DONE, FAILED
 from cbrrt_ompl.cli.output import print_json, verdict
 
@@ -40,10 +40,10 @@ def run(arguments: argparse.Namespace) -> int:
     from cbrrt_ompl.scenario.scenario import load_scenario
     from cbrrt_ompl.verification import verify
 
-    trajectory = _load(arguments)
+    scenario = load_scenario(arguments.scenario)
     verification = verify(
-        trajectory,
-        load_scenario(arguments.scenario),
+        as_kinematic(_load(arguments), arguments, scenario.robot),
+        scenario,
         tolerance=arguments.tolerance,
         collisions_only=arguments.collisions_only,
     )
@@ -56,12 +56,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _load(arguments: argparse.Namespace) -> Trajectory | Track:
-    """The trajectory or track of a file, kinematic where the file or ``--kinematic`` says so."""
+    """The trajectory or track of a file."""
     from cbrrt_ompl.export.ros_bag import is_bag, read_track
     from cbrrt_ompl.trajectory.foreign import load_track
 
     if is_bag(arguments.trajectory):
-        track: Trajectory | Track = read_track(arguments.trajectory, arguments.topic)
-    else:
-        track = load_track(arguments.trajectory)
-    return replace(track, kinematic=True) if arguments.kinematic else track
+        return read_track(arguments.trajectory, arguments.topic)
+    return load_track(arguments.trajectory)

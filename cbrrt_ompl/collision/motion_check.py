@@ -21,7 +21,9 @@ MOTION_RESOLUTION = 2.0 * ROOM
 """Largest distance between two checked points of a motion [m]."""
 
 
-def is_free(states: NDArray[np.float64], dt: float, scene: Scene, room: float = ROOM) -> bool:
+def is_free(
+    states: NDArray[np.float64], dt: float, scene: Scene, room: float = ROOM, *, is_kinematic: bool = False
+) -> bool:
     """Whether a motion is free between its rows as well: every point of it that a planner would look at.
 
     Args:
@@ -29,22 +31,24 @@ def is_free(states: NDArray[np.float64], dt: float, scene: Scene, room: float = 
         dt: time between two rows [s].
         scene: world and footprint.
         room: distance that all points but the first keep from everything [m].
+        is_kinematic: whether the velocities jump instead, at each row to those of the next one.
 
     Returns:
         False as soon as one of them is not.
     """
-    return bool(_are_rows_free(np.ascontiguousarray(states, dtype=np.float64), dt, scene, room))
+    return bool(_are_rows_free(np.ascontiguousarray(states, dtype=np.float64), dt, scene, room, is_kinematic))
 
 
 @kernel
-def _are_rows_free(states: NDArray[np.float64], dt: float, scene: Scene, room: float) -> bool:
+def _are_rows_free(states: NDArray[np.float64], dt: float, scene: Scene, room: float, is_kinematic: bool) -> bool:
     """:func:`is_free`, compiled."""
     distance, any_heading = clearance(scene, states[0, 0], states[0, 1], states[0, 2], ENOUGH)
     if distance <= 0.0:
         return False
     margin = max(distance - room, 0.0)
     for i in range(1, len(states)):
-        start = (states[i - 1, 0], states[i - 1, 1], states[i - 1, 2], states[i - 1, 3], states[i - 1, 4])
+        before = i if is_kinematic else i - 1
+        start = (states[i - 1, 0], states[i - 1, 1], states[i - 1, 2], states[before, 3], states[before, 4])
         end = (states[i, 0], states[i, 1], states[i, 2], states[i, 3], states[i, 4])
         way = way_of_step(start, end, lever_arm(scene.frame[0], any_heading), dt)
         if margin >= way:

@@ -31,7 +31,7 @@ class DriveSettings:
     cycle: float = 0.1
     """Time between two looks, and what a plan may take [s]; whole planning steps."""
     planner: str = "cb-rrt-robust"
-    """Name of a planner that keeps the acceleration limits."""
+    """Name of a planner that keeps the acceleration limits: none of S-RRT."""
     goal_bias: float | None = None
     """Share of samples that are the goal itself, 0 to 1; None is what the scenario or else the planner has."""
     margin: float = 0.01

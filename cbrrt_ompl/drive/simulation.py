@@ -80,7 +80,7 @@ class Drive:
         self._planning = self.settings.planning(scenario.planning)
         self._knowledge = Knowledge(known, self.hidden)
         self._rng = np.random.default_rng(seed)
-        self._driven, self._steps_driven = [_at_start(scenario.start)], 0
+        self._driven, self._steps_driven = [_at_start(scenario)], 0
         self._last: Trajectory | None = None  # the plan before, from the next look on
         self._plan: Trajectory | None = None  # the rest of it from now on; None while braking
         self._committed = self._driven[0].stopping_at(0.0, self._robot.limits, self._dt)
@@ -90,7 +90,7 @@ class Drive:
         warm_up_planner(self.settings.planner)
         if self.settings.max_iterations > 0:
             warm_up_improvement()
-        if not is_free(self._committed.states, self._dt, self.world.scene(self._robot.footprint)):
+        if not self._is_free_in(self.world, self._committed):
             expected = f"a state with {self.settings.margin:g} m of room (the margin), on the way to rest as well"
             raise ScenarioError(Problem("start", list(scenario.start), expected))
 
@@ -227,7 +227,10 @@ class Drive:
 
     def _is_free(self, motion: Trajectory) -> bool:
         """Whether a motion is free in all that is known."""
-        return is_free(motion.states, self._dt, self._knowledge.world.scene(self._robot.footprint))
+        return self._is_free_in(self._knowledge.world, motion)
+
+    def _is_free_in(self, world: World, motion: Trajectory) -> bool:
+        return is_free(motion.states, self._dt, world.scene(self._robot.footprint), is_kinematic=motion.kinematic)
 
 
 def drive(
@@ -264,10 +267,11 @@ def _check_range(scenario: Scenario, settings: DriveSettings) -> None:
         raise SettingsError(Problem("sensor_range", settings.sensor_range, expected))
 
 
-def _at_start(start: State) -> Trajectory:
+def _at_start(scenario: Scenario) -> Trajectory:
     """A trajectory of one row."""
+    start = scenario.start
     columns = [np.array([value]) for value in (0.0, *start, start.v, start.omega)]
-    return Trajectory(*columns)
+    return Trajectory(*columns, kinematic=scenario.robot.limits.is_first_order)
 
 
 def _part(trajectory: Trajectory, first: int, last: int | None, dt: float) -> Trajectory:
@@ -279,7 +283,7 @@ def _part(trajectory: Trajectory, first: int, last: int | None, dt: float) -> Tr
         states = np.concatenate([states, np.repeat(states[-1:], missing, axis=0)])
         commands = np.concatenate([commands, np.zeros((missing, 2))])
     rows = slice(first, None if last is None else last + 1)
-    return _from_rows(states[rows], commands[rows], dt)
+    return _from_rows(states[rows], commands[rows], dt, trajectory.kinematic)
 
 
 def _joined(pieces: Sequence[Trajectory], dt: float) -> Trajectory:
@@ -287,9 +291,10 @@ def _joined(pieces: Sequence[Trajectory], dt: float) -> Trajectory:
     states = np.concatenate([pieces[0].states[:1], *(piece.states[1:] for piece in pieces)])
     commands = [np.column_stack([piece.v_command, piece.omega_command])[:-1] for piece in pieces]
     last = pieces[-1]
-    return _from_rows(states, np.concatenate([*commands, [[last.v_command[-1], last.omega_command[-1]]]]), dt)
+    commands.append(np.array([[last.v_command[-1], last.omega_command[-1]]]))
+    return _from_rows(states, np.concatenate(commands), dt, last.kinematic)
 
 
-def _from_rows(states: NDArray[np.float64], commands: NDArray[np.float64], dt: float) -> Trajectory:
+def _from_rows(states: NDArray[np.float64], commands: NDArray[np.float64], dt: float, is_kinematic: bool) -> Trajectory:
     t: NDArray[np.float64] = dt * np.arange(len(states), dtype=np.float64)
-    return Trajectory(t, *states.T, *commands.T)
+    return Trajectory(t, *states.T, *commands.T, kinematic=is_kinematic)

@@ -272,7 +272,8 @@ def _driven(
     pose, velocity = state[:3], state[3:]
     for _ in range(_SUBSTEPS):
         after = bounded(velocity, command, dt, follower.limits)
-        (v0, w0), (v1, w1) = velocity * kept, after * kept
+        before = after if follower.limits.is_first_order else velocity
+        (v0, w0), (v1, w1) = before * kept, after * kept
         pose = pose + displacement(*(np.array([value]) for value in (pose[2], v0, v1, w0, w1, dt)))[0]
         velocity = after
     return np.concatenate([pose[:2], wrapped(pose[2:]), velocity])

@@ -62,6 +62,12 @@ def has_wheel_limits(limits: Limits) -> bool:
     return limits.wheel_speed < math.inf or limits.wheel_acceleration < math.inf
 
 
+@kernel
+def velocities_jump(limits: Limits) -> bool:
+    """:attr:`cbrrt_ompl.problem.robot.Limits.is_first_order`, for kernels."""
+    return limits.acceleration == math.inf
+
+
 INSIDE = 1.0 - 1e-15
 """Leaves room for the rounding of a product, so that a scaled command is within its limit and not scaled again."""
 
@@ -276,7 +282,8 @@ def dynamic_step(
 ) -> tuple[float, float, float, float, float]:
     """State one step later, the velocities ramping to a command under the acceleration limits.
 
-    Robots with wheel limits ramp by :func:`joint_ramp`, all others by :func:`ramp`.
+    Robots with wheel limits ramp by :func:`joint_ramp`, all others by :func:`ramp`; the velocities of a robot without
+    acceleration limits jump, see :func:`kinematic_step`.
 
     Args:
         x: position [m].
@@ -291,6 +298,8 @@ def dynamic_step(
     Returns:
         (x, y, theta, v, omega) at the end of the step.
     """
+    if velocities_jump(limits):
+        return kinematic_step(x, y, theta, command, dt)
     if has_wheel_limits(limits):
         v_next, omega_next = joint_ramp(v, omega, command[0], command[1], limits, dt)
     else:
@@ -304,7 +313,7 @@ def dynamic_step(
 def kinematic_step(
     x: float, y: float, theta: float, command: tuple[float, float], dt: float
 ) -> tuple[float, float, float, float, float]:
-    """State one step later, the velocities jumping to a command: the motion model of S-RRT.
+    """State one step later, the velocities jumping to a command: that of S-RRT and robots of first order.
 
     Args:
         x: position [m].

@@ -53,6 +53,7 @@ MODEL = np.dtype(
     [
         ("law", np.int64),  # OPEN_LOOP, CLOSED_LOOP or STEERING
         ("law_address", np.int64),  # of a control law in the place of Kanayama's, see motion.laws; else 0
+        ("jumps", np.bool_),  # whether the velocities jump to their commands
         ("dt", np.float64),  # integration step [s]
         ("steps", np.int64),  # of a whole extension
         ("look_ahead", np.float64),  # largest distance of the reference from its node [m]
@@ -85,6 +86,7 @@ def make_model(law: int, robot: Robot, goal: Goal, planning: PlanningSettings) -
     model = record_array(1, MODEL)
     model["law"], model["dt"], model["steps"] = law, planning.step, planning.steps
     model["law_address"] = law_address(planning.law)
+    model["jumps"] = jumps(law, robot)
     model["look_ahead"] = planning.reference_distance(robot.limits)
     model["equal_control_tolerance"] = planning.equal_control_tolerance
     model["room"] = motion_room(planning.clearance)
@@ -101,6 +103,11 @@ def make_model(law: int, robot: Robot, goal: Goal, planning: PlanningSettings) -
         math.inf if goal.speed_tolerance is None else goal.speed_tolerance,
     )
     return model
+
+
+def jumps(law: int, robot: Robot) -> bool:
+    """Whether velocities jump to their commands: those of S-RRT, and all of a robot of first order."""
+    return law == STEERING or robot.limits.is_first_order
 
 
 def motion_room(clearance: float) -> float:
@@ -121,7 +128,7 @@ def check_step(robot: Robot, planning: PlanningSettings) -> None:
     limits = robot.limits
     fastest, spread = max(-limits.omega_min, limits.omega_max), limits.omega_max - limits.omega_min
     longest_ramp = max(MAX_CHANGE_PER_STEP / spread, math.sqrt(MAX_CHANGE_PER_STEP / limits.angular_acceleration))
-    longest = min(MAX_TURN_PER_STEP / fastest, longest_ramp)
+    longest = min(MAX_TURN_PER_STEP / fastest, math.inf if limits.is_first_order else longest_ramp)
     if planning.step > longest * (1.0 + 1e-9):
         expected = f"at most {longest:.3g} s for a robot that turns at {fastest:.3g} rad/s"
         raise SettingsError(Problem("planning.step", planning.step, expected))
@@ -174,7 +181,7 @@ def advance(
     else:
         command = (control[0], control[1])
     command = saturate(command[0], command[1], model.limits)
-    if model.law == STEERING:
+    if model.jumps:
         x, y, theta, v, omega = kinematic_step(x, y, theta, command, dt)
     else:
         x, y, theta, v, omega = dynamic_step(x, y, theta, v, omega, command, model.limits, dt)
@@ -221,7 +228,7 @@ def manoeuvre_command(
         (goal.x, goal.y, goal.theta),
         goal.heading_tolerance < math.inf,
         manoeuvre == REVERSE,
-        model.law == STEERING,
+        model.jumps,
         model.limits,
         model.dt,
     )

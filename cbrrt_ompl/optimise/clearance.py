@@ -7,9 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.collision.clearance import ENOUGH, clearance, clearances_at
-from cbrrt_ompl.collision.motion_check import check_step_motion, is_free
-from cbrrt_ompl.collision.scene import Scene
+from cbrrt_ompl.collision.clearance import clearances_at
+from cbrrt_ompl.collision.motion_check import is_free
 from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.motion.kinematics import brake
 from cbrrt_ompl.motion.model import motion_room
@@ -34,25 +33,8 @@ def is_motion_free(states: NDArray[np.float64], dt: float, scenario: Scenario, *
         scenario: world and footprint.
         is_kinematic: whether the velocities jump instead, at each row to those of the next one.
     """
-    scene, room = scenario.world.scene(scenario.robot.footprint), least_clearance(scenario)
-    if is_kinematic:
-        return bool(are_jumps_free(np.ascontiguousarray(states), dt, scene, room))
-    return is_free(states, dt, scene, room)
-
-
-@kernel
-def are_jumps_free(states: NDArray[np.float64], dt: float, scene: Scene, room: float) -> bool:
-    """Whether a motion is free in which each row holds the velocities of the step that leads to it."""
-    distance, any_heading = clearance(scene, states[0, 0], states[0, 1], states[0, 2], ENOUGH)
-    margin = max(distance - room, 0.0)
-    for i in range(1, len(states)):
-        v, omega = states[i, 3], states[i, 4]
-        start = (states[i - 1, 0], states[i - 1, 1], states[i - 1, 2], v, omega)
-        end = (states[i, 0], states[i, 1], states[i, 2], v, omega)
-        margin, any_heading = check_step_motion(start, end, margin, any_heading, scene, room, dt)
-        if margin <= 0.0:
-            return False
-    return distance > 0.0
+    scene = scenario.world.scene(scenario.robot.footprint)
+    return is_free(states, dt, scene, least_clearance(scenario), is_kinematic=is_kinematic)
 
 
 def clearances(states: NDArray[np.float64], scenario: Scenario) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cbrrt_ompl.optimise.program import STEP, THETA
+from cbrrt_ompl.optimise.program import OMEGA, STEP, THETA, V
 from cbrrt_ompl.problem.robot import Limits
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 
@@ -31,7 +31,7 @@ class Guess(NamedTuple):
     states: NDArray[np.float64]
     """Rows of (x, y, theta, v, omega, h), theta without jumps, shape (N + 1, 6)."""
     controls: NDArray[np.float64]
-    """Rows of (a, alpha), shape (N, 2)."""
+    """Rows of (a, alpha), shape (N, 2); in a solution for a kinematic robot the velocities (v, omega)."""
     source: str
     """Where it comes from."""
 
@@ -82,7 +82,7 @@ def with_controls(states: NDArray[np.float64], h: float, source: str) -> Guess:
     return Guess(np.column_stack([states, np.full(len(states), h)]), controls, source)
 
 
-def refined(guess: Guess) -> Guess:
+def refined(guess: Guess, *, is_kinematic: bool) -> Guess:
     """The same motion in twice as many intervals."""
     n = len(guess.controls)
     h = 0.5 * guess.states[0, STEP]
@@ -90,7 +90,9 @@ def refined(guess: Guess) -> Guess:
     states[::2] = guess.states
     before, a = guess.states[:-1], guess.controls
     states[1::2] = 0.5 * (guess.states[1:] + before)
-    states[1::2, THETA] = before[:, THETA] + h * before[:, 4] + 0.5 * h * h * a[:, 1]
+    if is_kinematic:
+        states[1::2, V : OMEGA + 1] = a
+    states[1::2, THETA] = before[:, THETA] + h * (a[:, 1] if is_kinematic else before[:, OMEGA] + 0.5 * h * a[:, 1])
     states[:, STEP] = h
     return Guess(states, np.repeat(a, 2, axis=0), guess.source)
 

@@ -67,7 +67,8 @@ def improve(
 
     Args:
         trajectory: from the scenario's start into its goal region, of any planner. A kinematic one, whose velocities
-            jump (S-RRT), is improved as such: accelerations have no limit, and the velocities keep theirs.
+            jump (S-RRT, robots of first order), is improved as such: accelerations have no limit, and the velocities
+            keep theirs.
         scenario: world, robot, start, goal and settings.
         time_limit: time to stop after, without that of compilation [s]; 1 s where nothing else is asked for.
         max_iterations: Newton steps to stop after: the result is then the same on every run, unless the time ends it.
@@ -127,10 +128,11 @@ class Improver:
             max_iterations: Newton steps to stop after.
             callback: called with each row of the history.
             should_stop: asked every few milliseconds whether to stop.
-            is_kinematic: whether the velocities jump.
+            is_kinematic: whether the velocities jump, as those of a robot of first order always do.
         """
         self.begin(time_limit, time.perf_counter())
         self._scenario, self._objective = scenario, objective
+        is_kinematic = is_kinematic or scenario.robot.limits.is_first_order
         self._transcription = Transcription(scenario, objective, is_kinematic=is_kinematic)
         self._max_iterations = max_iterations
         self._callback, self._should_stop = callback, should_stop
@@ -195,7 +197,7 @@ class Improver:
         """Solve for the best with twice as many intervals and more precisely."""
         if self._best_guess is None:
             return False
-        guess = refined(self._best_guess)
+        guess = refined(self._best_guess, is_kinematic=self._transcription.is_kinematic)
         return self.try_guess(guess._replace(source=f"{guess.source}, refined"), FINE, is_warm=True)
 
     def elapsed(self) -> float:

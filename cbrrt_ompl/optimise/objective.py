@@ -9,6 +9,7 @@ import numpy as np
 from cbrrt_ompl.checks import LARGEST, SMALLEST, is_number
 from cbrrt_ompl.errors import Problem, SettingsError
 from cbrrt_ompl.optimise.clearance import disc_distances
+from cbrrt_ompl.problem.robot import Limits
 from cbrrt_ompl.scenario.scenario import Scenario
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 
@@ -22,7 +23,8 @@ class Objective:
     L is the path length. r is 0 where the robot is farther than ``room_distance`` from everything and rises to 1 as it
     comes to touch something: the mean over the discs that stand for its footprint of max(0, 1 - d / room_distance)^2,
     d being a disc's distance. Each weight says what a thing is worth in seconds: a robot with ``room=0.5`` takes up to
-    half a second more to be spared a second in contact.
+    half a second more to be spared a second in contact. For a robot without acceleration limits, full acceleration is
+    the whole range of a velocity in a second.
 
     Raises:
         SettingsError: with every weight that makes no sense.
@@ -64,10 +66,14 @@ class Objective:
             tight = np.mean(lack * lack, axis=1)
             total += self.room * float(np.sum(0.5 * (tight[:-1] + tight[1:]) * steps))
         if self.smoothness > 0.0:
-            limits = scenario.robot.limits
-            a, alpha = (
-                np.diff(trajectory.v) / limits.acceleration,
-                np.diff(trajectory.omega) / limits.angular_acceleration,
-            )
+            most, most_angular = full_accelerations(scenario.robot.limits)
+            a, alpha = np.diff(trajectory.v) / most, np.diff(trajectory.omega) / most_angular
             total += self.smoothness * float(np.sum((a * a + alpha * alpha) / steps))
         return total
+
+
+def full_accelerations(limits: Limits) -> tuple[float, float]:
+    """What counts as full acceleration [m/s^2, rad/s^2]: the limits, or a velocity's whole range in a second."""
+    if limits.is_first_order:
+        return limits.v_max - limits.v_min, limits.omega_max - limits.omega_min
+    return limits.acceleration, limits.angular_acceleration

@@ -22,7 +22,7 @@ from cbrrt_ompl.motion.kinematics import (
     wrap_angle,
 )
 from cbrrt_ompl.motion.manoeuvres import BRAKE, is_manoeuvre, most_steps
-from cbrrt_ompl.motion.model import CLOSED_LOOP, STEERING, advance, in_goal, manoeuvre_has_ended
+from cbrrt_ompl.motion.model import CLOSED_LOOP, advance, in_goal, manoeuvre_has_ended
 from cbrrt_ompl.motion.records import Record
 
 MOTION_FREE, MOTION_BLOCKED = 0, 1
@@ -64,7 +64,7 @@ def integrate_block(steps: Record, v_command: float, omega_command: float, count
     xs, ys, thetas, vs, omegas = steps.x, steps.y, steps.theta, steps.v, steps.omega
     middles, dxs, dys = steps.middle, steps.dx, steps.dy
     v_command, omega_command = saturate(v_command, omega_command, limits)
-    if model.law == STEERING:
+    if model.jumps:
         vs[0], omegas[0] = v_command, omega_command
     theta, v, omega = thetas[0], vs[0], omegas[0]
     if has_wheel_limits(limits):
@@ -151,11 +151,10 @@ def free_steps(
     Returns:
         The number, and the margin and its ``any_heading`` after the last free one.
     """
-    dt, room, jumps = model.dt, model.room, model.law == STEERING
-    frame = scene.frame[0]
+    dt, room, frame = model.dt, model.room, scene.frame[0]
     for i in range(count):
         start, end = state_at(steps, i), state_at(steps, i + 1)
-        if jumps:
+        if model.jumps:
             start = (start[0], start[1], start[2], end[3], end[4])
         way = way_of_step(start, end, lever_arm(frame, any_heading), dt)
         if margin >= way:
@@ -245,7 +244,7 @@ def roll_out_brake_safe(
     Robots whose velocities jump stop on the spot, so that nothing is cut.
     """
     driven, outcome, end = roll_out(node, control, margin, any_heading, scene, model, steps)
-    if not model.brake_safe or model.law == STEERING or (outcome == MOTION_BLOCKED and not model.keep_cut):
+    if not model.brake_safe or model.jumps or (outcome == MOTION_BLOCKED and not model.keep_cut):
         return driven, outcome, end
     unchecked = driven
     if not model.keep_cut:  # the end first: it is the likeliest to be refused

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from cbrrt_ompl.checks import A_NUMBER, A_POSITIVE_NUMBER, LARGEST, SMALLEST, counter_clockwise_ring, is_number
 from cbrrt_ompl.errors import Problem, RobotError, WorldError
 
-_UNLIMITED = ("wheel_speed", "wheel_acceleration")
+_UNLIMITED = ("acceleration", "angular_acceleration", "wheel_speed", "wheel_acceleration")
 """Limits that may be infinite."""
 
 
@@ -32,7 +32,7 @@ class Limits(NamedTuple):
     omega_max: float = math.radians(30.0)
     """Largest turning rate [rad/s]."""
     acceleration: float = 0.6
-    """Largest change of v [m/s^2]."""
+    """Largest change of v [m/s^2]; infinite, as the next one, for a robot of first order, whose velocities jump."""
     angular_acceleration: float = math.radians(30.0)
     """Largest change of omega [rad/s^2]."""
     wheel_separation: float = 0.0
@@ -46,6 +46,11 @@ class Limits(NamedTuple):
     def has_wheel_limits(self) -> bool:
         """Whether a wheel limits the robot; v and omega then change together, not each on its own."""
         return self.wheel_speed < math.inf or self.wheel_acceleration < math.inf
+
+    @property
+    def is_first_order(self) -> bool:
+        """Whether nothing limits the accelerations, so that the velocities jump."""
+        return self.acceleration == math.inf
 
     def problems(self) -> list[Problem]:
         """What is wrong with these limits, one entry a mistake."""
@@ -62,9 +67,15 @@ class Limits(NamedTuple):
             if not (low <= 0.0 and high >= SMALLEST):
                 expected = f"a range [low, high] with low <= 0 < high, high at least {SMALLEST:g}"
                 found.append(Problem(f"limits.{name}", [low, high], expected))
-        for name in ("acceleration", "angular_acceleration", *_UNLIMITED):
+        for name in _UNLIMITED:
             if getattr(self, name) < SMALLEST:
                 found.append(Problem(f"limits.{name}", getattr(self, name), A_POSITIVE_NUMBER))
+        if self.is_first_order and self.wheel_acceleration < math.inf:
+            expected = "no limit for a robot without one of its acceleration"
+            found.append(Problem("limits.wheel_acceleration", self.wheel_acceleration, expected))
+        if self.is_first_order != (self.angular_acceleration == math.inf):
+            limit = f"{'a' if self.angular_acceleration == math.inf else 'no'} limit, as of the acceleration"
+            found.append(Problem("limits.angular_acceleration", self.angular_acceleration, limit))
         if self.wheel_separation < 0.0 or (self.has_wheel_limits and self.wheel_separation < SMALLEST):
             expected = "the distance between the wheels, above 0 [m]"
             found.append(Problem("limits.wheel_separation", self.wheel_separation, expected))

@@ -1,8 +1,10 @@
-"""Problems of the dynobench collection for second-order unicycles, read as scenarios."""
+"""Problems of the dynobench collection for unicycles of first and second order, read as scenarios."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,8 +32,10 @@ from cbrrt_ompl.scenario.sections import (
 if TYPE_CHECKING:
     from cbrrt_ompl.scenario.scenario import Scenario
 
-MODEL = "unicycle2"
-"""The robot that is read, by dynobench's name."""
+FIRST_ORDER, SECOND_ORDER = "unicycle1", "unicycle2"
+"""The robots that are read, by dynobench's names."""
+
+KINDS = f"{SECOND_ORDER}, the second-order unicycle, or {FIRST_ORDER}, that of first order"
 
 PUBLISHED_TOLERANCE = 0.2
 """Goal tolerance published for planners that sample, in dynobench's metric."""
@@ -44,11 +48,14 @@ def load_dynobench(
     forward_only: bool = False,
     tolerance: float = PUBLISHED_TOLERANCE,
 ) -> Scenario:
-    """Scenario of a dynobench problem for one second-order unicycle with a box as its footprint.
+    """Scenario of a dynobench problem for one unicycle with a box as its footprint.
+
+    Velocities of a second-order unicycle (``unicycle2``) ramp, those of one of first order (``unicycle1``) jump.
 
     dynobench measures the distance to the goal as a weighted sum of the errors in position, heading, v and omega. Half
     of the tolerance goes to the position, a quarter to the heading and an eighth to each velocity (to the one with the
-    larger weight), so that whoever arrives in the goal region of the scenario is within the tolerance there.
+    larger weight); of a robot of first order, whose velocities do not count, half to the heading. So whoever arrives in
+    the goal region of the scenario is within the tolerance there.
 
     Args:
         problem_path: YAML file of the problem: environment, start and goal.
@@ -68,10 +75,11 @@ def load_dynobench(
 
     if not (is_number(tolerance) and tolerance > 0.0):
         raise SettingsError(Problem("tolerance", tolerance, "a number above 0"))
-    _refuse_other_kinds(as_path(model_path, MapError))
-    model = _read(as_path(model_path, MapError), _MODEL)
-    problem = _read(as_path(problem_path, MapError), _PROBLEM)
-    limits = Limits(**{ours: model[theirs] for ours, theirs in _LIMITS.items()})
+    kind = _kind_of(as_path(model_path, MapError))
+    model = _read(as_path(model_path, MapError), _model_keys(kind))
+    problem = _read(as_path(problem_path, MapError), _problem_keys(kind))
+    unlimited = {} if kind.name == SECOND_ORDER else dict.fromkeys(_ACCELERATIONS, math.inf)
+    limits = Limits(**{ours: model[theirs] for ours, theirs in kind.limits.items()}, **unlimited)
     length, width = model["size"]
     corners = [(-length, -width), (length, -width), (length, width), (-length, width)]
     footprint = Footprint.polygon([(0.5 * x, 0.5 * y) for x, y in corners])
@@ -86,33 +94,53 @@ def load_dynobench(
     )
 
 
-def _refuse_other_kinds(path: Path) -> None:
-    """Refuse models of other robots by the name that their file gives them, and not by the keys that they lack."""
+@dataclass(frozen=True)
+class _Kind:
+    """What the files of one kind of robot hold."""
+
+    name: str
+    """Beginning of dynobench's name."""
+    state: str
+    """Numbers of a state."""
+    weights: str
+    """What is weighted in the distance to the goal."""
+    limits: Mapping[str, str]
+    """dynobench's names of the limits, by those in `Limits`."""
+
+
+def _kind_of(path: Path) -> _Kind:
+    """The kind of a model; others are refused by the name that their file gives them, not by the keys that they lack.
+
+    A file without a name is taken for one of second order.
+    """
     try:
         data = read_yaml(path, [])
     except InputError as error:
         raise MapError(error.problems, str(path)) from None
     if not isinstance(data, Mapping):
-        return
+        return _KINDS[SECOND_ORDER]
     slowest, kind = data.get("min_vel"), data.get("dynamics")
     if is_number(slowest) and slowest > 0.0:
         expected = "0 or less: a robot that cannot stand still is not planned for"
         raise MapError(Problem("min_vel", slowest, expected), str(path))
-    if isinstance(kind, str) and not kind.startswith(MODEL):
-        expected = f"{MODEL}, the second-order unicycle"
-        raise MapError(Problem("dynamics", Remark(f"the robot {kind}"), expected), str(path))
+    if not isinstance(kind, str):
+        return _KINDS[SECOND_ORDER]
+    found = next((known for name, known in _KINDS.items() if kind.startswith(name)), None)
+    if found is None:
+        raise MapError(Problem("dynamics", Remark(f"the robot {kind}"), KINDS), str(path))
+    return found
 
 
 def _goal(state: list[float], weights: list[float], tolerance: float) -> Goal:
     """Goal region inside the ball about a state in dynobench's metric."""
-    position, heading, v, omega = weights
+    position, heading, *velocities = weights
     return Goal(
         x=state[0],
         y=state[1],
         tolerance=tolerance / (2.0 * position),
         theta=state[2],
-        heading_tolerance=tolerance / (4.0 * heading),
-        speed_tolerance=tolerance / (8.0 * max(v, omega)),
+        heading_tolerance=tolerance / ((4.0 if velocities else 2.0) * heading),
+        speed_tolerance=tolerance / (8.0 * max(velocities)) if velocities else None,
     )
 
 
@@ -158,12 +186,17 @@ def _positive(value: object, path: str, report: Report) -> float | None:
     return found
 
 
-def _weights(value: object, path: str, report: Report) -> list[float] | None:
-    values: list[float] | None = _numbers("position, theta, v, omega")(value, path, report)
-    if values is not None and min(values) <= 0.0:
-        report.add(path, value, "four weights above 0")
-        return None
-    return values
+def _weights(names: str) -> Converter:
+    """Reader of a weight for each of some names."""
+
+    def read(value: object, path: str, report: Report) -> list[float] | None:
+        values: list[float] | None = _numbers(names)(value, path, report)
+        if values is not None and min(values) <= 0.0:
+            report.add(path, value, f"{len(values)} weights above 0")
+            return None
+        return values
+
+    return read
 
 
 def _environment(value: object, path: str, report: Report) -> dict[str, Any] | None:
@@ -181,33 +214,46 @@ def _box(value: object, path: str, report: Report) -> Box | None:
     return build(Box, corners, path, report)
 
 
-def _rest(value: object, path: str, report: Report) -> list[float] | None:
-    values: list[float] | None = _numbers(_STATE)(value, path, report)
-    if values is not None and values[3:] != [0.0, 0.0]:
-        report.add(path, value, "a state at rest: v and omega 0")
-        return None
-    return values
+def _rest(names: str) -> Converter:
+    """Reader of a state at rest."""
+
+    def read(value: object, path: str, report: Report) -> list[float] | None:
+        values: list[float] | None = _numbers(names)(value, path, report)
+        if values is not None and any(values[3:]):
+            report.add(path, value, "a state at rest: v and omega 0")
+            return None
+        return values
+
+    return read
 
 
-def _driver(value: object, path: str, report: Report) -> dict[str, Any] | None:
-    return _known(value, path, _DRIVER, report)
+def _drivers(kind: _Kind) -> Converter:
+    """Reader of a list of one robot of a kind."""
+    keys = {
+        "type": Key(text),
+        "start": Key(_numbers(kind.state), required=f"the state to start in [{kind.state}]"),
+        "goal": Key(_rest(kind.state), required=f"the state to arrive in [{kind.state}]"),
+    }
+
+    def driver(value: object, path: str, report: Report) -> dict[str, Any] | None:
+        return _known(value, path, keys, report)
+
+    def read(value: object, path: str, report: Report) -> list[Any] | None:
+        if not isinstance(value, list) or len(value) != 1:
+            several = isinstance(value, list) and len(value) > 1
+            found = Remark(f"{len(value)} robots") if several else value  # type: ignore[arg-type]  # a list
+            report.add(path, found, f"a list of one robot{': problems of several are not planned for' * several}")
+            return None
+        name = value[0].get("type") if isinstance(value[0], Mapping) else None
+        if isinstance(name, str) and not name.startswith(kind.name):
+            report.add(f"{path}[0].type", Remark(f"the robot {name}"), f"{kind.name}, which the model describes")
+            return None
+        found_robots: list[Any] = list_of(driver, "")(value, path, report)
+        return found_robots
+
+    return read
 
 
-def _drivers(value: object, path: str, report: Report) -> list[Any] | None:
-    if not isinstance(value, list) or len(value) != 1:
-        several = isinstance(value, list) and len(value) > 1
-        found = Remark(f"{len(value)} robots") if several else value  # type: ignore[arg-type]  # a list
-        report.add(path, found, f"a list of one robot{': problems of several are not planned for' * several}")
-        return None
-    kind = value[0].get("type") if isinstance(value[0], Mapping) else None
-    if isinstance(kind, str) and not kind.startswith(MODEL):
-        report.add(f"{path}[0].type", Remark(f"the robot {kind}"), f"{MODEL}, the second-order unicycle")
-        return None
-    found_robots: list[Any] = list_of(_driver, "")(value, path, report)
-    return found_robots
-
-
-_STATE = "x, y, theta, v, omega"
 _pair = pair_of("two finite numbers [x, y] [m]")
 _BOX = {
     "type": Key(one_of(["box"]), required="box"),
@@ -219,27 +265,30 @@ _ENVIRONMENT = {
     "max": Key(_pair, required="the upper right corner [x, y] [m]"),
     "obstacles": Key(list_of(_box, "a list of boxes")),
 }
-_DRIVER = {
-    "type": Key(text),
-    "start": Key(_numbers(_STATE), required=f"the state to start in [{_STATE}]"),
-    "goal": Key(_rest, required=f"the state to arrive in [{_STATE}]"),
+_VELOCITIES = {"v_min": "min_vel", "v_max": "max_vel", "omega_min": "min_angular_vel", "omega_max": "max_angular_vel"}
+_ACCELERATIONS = {"acceleration": "max_acc_abs", "angular_acceleration": "max_angular_acc"}
+_KINDS = {
+    FIRST_ORDER: _Kind(FIRST_ORDER, "x, y, theta", "position, theta", _VELOCITIES),
+    SECOND_ORDER: _Kind(
+        SECOND_ORDER, "x, y, theta, v, omega", "position, theta, v, omega", _VELOCITIES | _ACCELERATIONS
+    ),
 }
-_PROBLEM = {
-    "name": Key(text),
-    "environment": Key(_environment, required="min, max and obstacles"),
-    "robots": Key(_drivers, required="a list of one robot"),
-}
-_LIMITS = {
-    "v_min": "min_vel",
-    "v_max": "max_vel",
-    "omega_min": "min_angular_vel",
-    "omega_max": "max_angular_vel",
-    "acceleration": "max_acc_abs",
-    "angular_acceleration": "max_angular_acc",
-}
-_MODEL = {
-    **{name: Key(number, required="a number") for name in _LIMITS.values()},
-    "size": Key(_pair, required="length and width of the footprint [m]"),
-    "distance_weights": Key(_weights, required="four weights above 0"),
-    "dt": Key(_positive, required="the time step [s]"),
-}
+
+
+def _problem_keys(kind: _Kind) -> dict[str, Key]:
+    """Keys of the problems of a kind."""
+    return {
+        "name": Key(text),
+        "environment": Key(_environment, required="min, max and obstacles"),
+        "robots": Key(_drivers(kind), required="a list of one robot"),
+    }
+
+
+def _model_keys(kind: _Kind) -> dict[str, Key]:
+    """Keys of the models of a kind."""
+    return {
+        **{name: Key(number, required="a number") for name in kind.limits.values()},
+        "size": Key(_pair, required="length and width of the footprint [m]"),
+        "distance_weights": Key(_weights(kind.weights), required=f"the weights [{kind.weights}] above 0"),
+        "dt": Key(_positive, required="the time step [s]"),
+    }

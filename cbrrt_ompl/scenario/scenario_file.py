@@ -19,6 +19,7 @@ from cbrrt_ompl.scenario.footprints import disc, footprint
 from cbrrt_ompl.scenario.map_layers import load_layers, map_layers, source_data
 from cbrrt_ompl.scenario.nav2 import FOREIGN_KEYS, Nav2Robot, nav2_robot
 from cbrrt_ompl.scenario.sections import (
+    UNLIMITED,
     Key,
     Report,
     build,
@@ -26,6 +27,7 @@ from cbrrt_ompl.scenario.sections import (
     kind_of,
     list_of,
     number,
+    number_or_unlimited,
     one_of,
     pair_of,
     read_partial,
@@ -117,6 +119,8 @@ def _limits(value: object, path: str, report: Report) -> dict[str, Any] | None:
     values = read_section(value, path, LIMITS, report)
     if values is None:
         return None
+    if values.get("acceleration") == math.inf:
+        values.setdefault("angular_acceleration", math.inf)
     for name in {"v", "omega"} & values.keys():
         values[f"{name}_min"], values[f"{name}_max"] = values.pop(name)
     return values
@@ -189,11 +193,11 @@ OBSTACLES: dict[str, dict[str, Key]] = {
 LIMITS = {
     "v": Key(_range),
     "omega": Key(_range, is_angle=True),
-    "acceleration": Key(number),
-    "angular_acceleration": Key(number, is_angle=True),
+    "acceleration": Key(number_or_unlimited),
+    "angular_acceleration": Key(number_or_unlimited, is_angle=True),
     "wheel_separation": Key(number),
-    "wheel_speed": Key(number),
-    "wheel_acceleration": Key(number),
+    "wheel_speed": Key(number_or_unlimited),
+    "wheel_acceleration": Key(number_or_unlimited),
 }
 GAINS = {name: Key(number) for name in Gains._fields}
 ROBOT = {
@@ -281,8 +285,8 @@ def robot_data(robot: Robot) -> dict[str, Any]:
         "limits": {
             "v": _floats((limits.v_min, limits.v_max)),
             "omega": _floats((limits.omega_min, limits.omega_max)),
-            "acceleration": float(limits.acceleration),
-            "angular_acceleration": float(limits.angular_acceleration),
+            "acceleration": UNLIMITED if limits.is_first_order else float(limits.acceleration),
+            "angular_acceleration": UNLIMITED if limits.is_first_order else float(limits.angular_acceleration),
             **_wheel_data(limits),
         },
         **({} if robot.gains is None else {"gains": {k: float(value) for k, value in robot.gains._asdict().items()}}),

@@ -16,6 +16,9 @@ from cbrrt_ompl.scenario.plain_yaml import key_path
 T = TypeVar("T")
 
 
+UNLIMITED = "unlimited"
+"""What stands for a limit that there is not."""
+
 MAX_TEXT = 1000
 """Longest text that is read, such as a name [characters]."""
 
@@ -134,6 +137,16 @@ def number(value: object, path: str, report: Report) -> float | None:
         return float(value)
     report.add(path, value, "a finite number")
     return None
+
+
+def number_or_unlimited(value: object, path: str, report: Report) -> float | None:
+    """A finite number, or infinity where it says so."""
+    if value == UNLIMITED:
+        return math.inf
+    if not is_number(value):
+        report.add(path, value, f"a finite number, or {UNLIMITED}")
+        return None
+    return float(value)
 
 
 def whole_number(value: object, path: str, report: Report) -> int | None:

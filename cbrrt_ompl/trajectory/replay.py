@@ -37,7 +37,7 @@ def trajectory_from_controls(
     raise_errors()
     t = model["dt"][0] * np.arange(len(states))
     limits = Limits(*model["limits"][0].tolist())
-    return Trajectory(t, *states.T, *commands.T, kinematic=model["law"][0] == STEERING, limits=limits)
+    return Trajectory(t, *states.T, *commands.T, kinematic=model["jumps"][0], limits=limits)
 
 
 def tree_from_controls(
