@@ -82,8 +82,14 @@ def main() -> None:
     parser.add_argument("--cycle", type=float, default=0.1, help="[s]")
     parser.add_argument("--max-samples", type=int, help="limit of a plan instead of the cycle's time")
     parser.add_argument("--all-hidden", action="store_true", help="hide the known obstacles too")
+    parser.add_argument("--line-of-sight", action="store_true", help="do not see what obstacles hide")
     arguments = parser.parse_args()
-    settings = DriveSettings(arguments.sensor_range, arguments.cycle, max_samples=arguments.max_samples)
+    settings = DriveSettings(
+        arguments.sensor_range,
+        arguments.cycle,
+        max_samples=arguments.max_samples,
+        line_of_sight=arguments.line_of_sight,
+    )
     began, results, possible = time.perf_counter(), [], 0
     collisions, invalid, moving = [], [], []
     for world in range(arguments.first, arguments.first + arguments.worlds):

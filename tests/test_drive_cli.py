@@ -62,6 +62,26 @@ def test_drive_with_json_prints_the_figures(hall: str, tmp_path: Path, capsys: p
     assert figures["smallest_clearance"] > 0.0
 
 
+def test_drive_sees_what_is_in_line_of_sight_alone_when_asked_to(
+    hall: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The hidden box is within range of the start, behind that of the scenario."""
+    hidden = tmp_path / "hidden.yaml"
+    hidden.write_text("obstacles:\n  - {type: box, min: [4.6, 1.8], max: [4.8, 2.2]}\n")
+    page = tmp_path / "way.html"
+    options = ["--sensor-range", "5", "--max-samples", "3000", "--seed", "4", "--json", "--animation", str(page)]
+    seen_first = []
+    for more in ([], ["--line-of-sight"]):
+        assert main(["drive", hall, "--hidden", str(hidden), *options, *more]) == 0
+        assert json.loads(capsys.readouterr().out)["violations"] == []
+        numbers = json.loads(page.read_text("utf-8").split('id="numbers" type="application/json">')[1].split("</")[0])[
+            "drive"
+        ]
+        seen_first.append(numbers["seen"][0])
+        assert all(len(view) > 2 for view in numbers["views"]) == bool(more)
+    assert seen_first == [[0], []]
+
+
 def test_drive_that_stops_ends_with_one(hall: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     hidden = tmp_path / "hidden.yaml"
     hidden.write_text("obstacles:\n  - {type: box, min: [5, 0], max: [5.2, 4]}\n")

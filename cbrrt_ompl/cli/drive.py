@@ -47,6 +47,9 @@ def add_parser(commands: Commands) -> None:
         "--sensor-range", type=metres, default=3.0, metavar="R", help="how far the robot sees [m] (default: 3)"
     )
     parser.add_argument(
+        "--line-of-sight", action="store_true", help="do not see what obstacles hide (default: all within range)"
+    )
+    parser.add_argument(
         "--cycle", type=seconds, default=0.1, metavar="S",
         help="time between two looks, and of a plan [s] (default: 0.1)",
     )  # fmt: skip
@@ -72,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
     from cbrrt_ompl.scenario.scenario import load_scenario
 
     scenario = load_scenario(arguments.scenario)
-    names = ("sensor_range", "cycle", "planner", "max_samples", "max_iterations")
+    names = ("sensor_range", "cycle", "planner", "max_samples", "max_iterations", "line_of_sight")
     settings = DriveSettings(**{name: getattr(arguments, name) for name in names})
     hidden = None
     if arguments.unknown is not None:

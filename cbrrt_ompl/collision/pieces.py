@@ -92,7 +92,7 @@ def obstacle_pieces(obstacles: Sequence[Obstacle]) -> Pieces:
 @lru_cache(maxsize=10_000)
 def polygon_pieces(polygon: Polygon) -> Pieces:
     """The convex parts of a polygon; kept, since they take their time and worlds share their obstacles."""
-    return _ring_pieces(convex_parts(polygon.to_shapely()))
+    return ring_pieces(convex_parts(polygon.to_shapely()))
 
 
 def rectangle_pieces(centers: NDArray[np.float64], sizes: NDArray[np.float64], angle: float = 0.0) -> Pieces:
@@ -111,16 +111,16 @@ def footprint_pieces(footprint: Footprint, center: tuple[float, float]) -> Piece
     """The convex parts of a footprint with corners, about a centre in the robot's frame [m]; none of a round one."""
     if footprint.vertices is None:
         return join(())
-    return _ring_pieces([ring - center for ring in convex_parts(shapely.Polygon(footprint.vertices))])
+    return ring_pieces([ring - center for ring in convex_parts(shapely.Polygon(footprint.vertices))])
 
 
-def _ring_pieces(rings: list[NDArray[np.float64]]) -> Pieces:
-    """Polygons of rings of corners, each of shape (n, 2) [m]."""
+def ring_pieces(rings: Sequence[NDArray[np.float64]]) -> Pieces:
+    """Pieces of convex rings of corners, counter-clockwise, each of shape (n, 2) [m]."""
     counts = [len(ring) for ring in rings]
     pieces = np.zeros(len(rings), dtype=PIECE)
-    pieces["kind"], pieces["count"], pieces["first"] = POLYGON, counts, np.cumsum([0, *counts[:-1]])
-    pieces["x"], pieces["y"] = np.transpose([ring.mean(axis=0) for ring in rings])
-    return Pieces(pieces, np.concatenate([corner_records(ring) for ring in rings]))
+    pieces["kind"], pieces["count"], pieces["first"] = POLYGON, counts, np.cumsum([0, *counts])[:-1]
+    pieces["x"], pieces["y"] = np.array([ring.mean(axis=0) for ring in rings]).reshape(-1, 2).T
+    return Pieces(pieces, np.concatenate([np.empty(0, dtype=CORNER), *(corner_records(ring) for ring in rings)]))
 
 
 def corner_records(ring: NDArray[np.float64]) -> Records:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.drive.settings import DriveSettings
+from cbrrt_ompl.drive.sight import Sight
 from cbrrt_ompl.planning import SOLVED
 from cbrrt_ompl.problem.obstacles import Obstacle
 from cbrrt_ompl.problem.settings import Goal, State
@@ -103,6 +104,11 @@ class DriveResult:
     def computing_times(self) -> NDArray[np.float64]:
         """Times of all computing in the cycles, shape (m,) [s]."""
         return np.array([cycle.computing_time for cycle in self.cycles])
+
+    @cached_property
+    def sight(self) -> Sight | None:
+        """What blocks the sight in the true world; None where nothing did."""
+        return Sight(self.world.obstacles) if self.settings.line_of_sight else None
 
     @cached_property
     def blocked_by(self) -> str:

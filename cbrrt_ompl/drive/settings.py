@@ -44,6 +44,8 @@ class DriveSettings:
     """Plans made while standing, each with twice the time (or samples) of the one before, before the robot gives up."""
     time_limit: float = 600.0
     """Time of driving after which the robot stops [s]."""
+    line_of_sight: bool = False
+    """Whether obstacles hide what is behind them; else all within the sensor's range is seen."""
 
     def __post_init__(self) -> None:
         """Check all values together."""
@@ -62,6 +64,8 @@ class DriveSettings:
                 problems.append(Problem(name, value, "a whole number of 1 or more"))
         if not (isinstance(self.max_iterations, int) and self.max_iterations >= 0):
             problems.append(Problem("max_iterations", self.max_iterations, "a whole number of 0 or more"))
+        if not isinstance(self.line_of_sight, bool):
+            problems.append(Problem("line_of_sight", self.line_of_sight, "True or False"))
         known = [name for name, row in PLANNERS.items() if row.steering is not Steering.RATES]
         if self.planner not in known:
             problems.append(Problem("planner", self.planner, f"one of {', '.join(known)}"))
@@ -115,6 +119,15 @@ def needed_range(robot: Robot, settings: DriveSettings, step: float) -> float:
     fastest = max(robot.limits.v_max, -robot.limits.v_min)
     size = robot.footprint.circumscribed_radius + settings.margin
     return 2.0 * settings.cycle * fastest + stopping_distance(robot, step) + size
+
+
+def hides_itself(footprint: Footprint) -> bool:
+    """Whether a part of a footprint's border cannot be seen from the robot's origin through the footprint alone."""
+    if footprint.vertices is None:
+        return False
+    a = footprint.vertices
+    b = np.roll(a, -1, axis=0)
+    return bool((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] <= 0.0).any())
 
 
 def grown(footprint: Footprint, margin: float) -> Footprint:

@@ -3,7 +3,8 @@
 At every look the robot is already committed to the cycle that begins and to braking after it, both proven free. While
 it drives that cycle, it decides upon the next: a cycle of its plan with the braking after that, if they are free in all
 that is known; else the braking that is ready. The sensor reaches farther than all of that, so nothing unknown is in the
-way: there is always a way to rest that is proven free, and the robot never leaves it.
+way: there is always a way to rest that is proven free, and the robot never leaves it. Where obstacles hide what is
+behind them, none of it may lead through space that no look has shown.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.drive.improving import improved
 from cbrrt_ompl.drive.knowledge import Knowledge
 from cbrrt_ompl.drive.result import LATE, NO_ROOM, REACHED, STOPPED, UNSAFE, Cycle, DriveResult, Replan
-from cbrrt_ompl.drive.settings import DriveSettings, grown, needed_range
+from cbrrt_ompl.drive.settings import DriveSettings, grown, hides_itself, needed_range
 from cbrrt_ompl.errors import Problem, ScenarioError, SettingsError
 from cbrrt_ompl.planning import plan, warm_up_improvement, warm_up_planner
 from cbrrt_ompl.problem.obstacles import Obstacle
@@ -65,8 +66,8 @@ class Drive:
             seed: of all plans together; None draws a fresh one.
 
         Raises:
-            SettingsError: if the cycle is not whole planning steps, or the sensor does not reach as far as the robot
-                may be committed.
+            SettingsError: if the cycle is not whole planning steps, the sensor does not reach as far as the robot may
+                be committed, or there is a line of sight and the footprint hides a part of itself from its origin.
             ScenarioError: if an obstacle is nearer to the start than the margin, or in the way of braking from there.
         """
         self.settings = settings or DriveSettings()
@@ -75,10 +76,10 @@ class Drive:
         self.scenario = replace(scenario, world=known)
         self.world = known.with_more(self.hidden) if hidden else scenario.world
         self._dt, self._cycle_steps = scenario.planning.step, self.settings.steps(scenario.planning)
-        _check_range(scenario, self.settings)
+        needed = _checked_range(scenario, self.settings)
         self._robot = replace(scenario.robot, footprint=grown(scenario.robot.footprint, self.settings.margin))
         self._planning = self.settings.planning(scenario.planning)
-        self._knowledge = Knowledge(known, self.hidden)
+        self._knowledge = Knowledge(known, self.hidden, needed if self.settings.line_of_sight else None)
         self._rng = np.random.default_rng(seed)
         self._driven, self._steps_driven = [_at_start(scenario)], 0
         self._last: Trajectory | None = None  # the plan before, from the next look on
@@ -216,10 +217,12 @@ class Drive:
         return better if self._is_free(better) else found
 
     def _commit(self, rest: Trajectory) -> bool:
-        """Follow a plan from the next look on, if its first cycle and the braking after that are free."""
+        """Follow a plan from the next look on, if its first cycle and the braking after that are free and seen."""
         row = min(self._cycle_steps, len(rest) - 1)
         committed = rest.stopping_at(rest.t[row], self._robot.limits, self._dt)
         if not self._is_free(committed):
+            return False
+        if not self._knowledge.is_seen(committed.states, self._dt, self._robot.footprint):
             return False
         self._plan, self._committed = rest, committed
         self._failures = 0
@@ -259,12 +262,16 @@ def drive(
     return Drive(scenario, hidden, settings, seed).run(progress)
 
 
-def _check_range(scenario: Scenario, settings: DriveSettings) -> None:
-    """Refuse a sensor that does not see as far as the robot may be committed."""
+def _checked_range(scenario: Scenario, settings: DriveSettings) -> float:
+    """How far the robot may be committed [m]; refuses a sensor that does not see as far, or not past the robot."""
     needed = needed_range(scenario.robot, settings, scenario.planning.step)
     if not settings.sensor_range > needed:
         expected = f"more than {needed:.4g} m: two cycles at full speed, braking, the robot's size and the margin"
         raise SettingsError(Problem("sensor_range", settings.sensor_range, expected))
+    if settings.line_of_sight and hides_itself(scenario.robot.footprint):
+        expected = "False for a footprint that hides a part of itself from its origin, where the sensor is"
+        raise SettingsError(Problem("line_of_sight", True, expected))
+    return needed
 
 
 def _at_start(scenario: Scenario) -> Trajectory:

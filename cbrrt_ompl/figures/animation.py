@@ -14,12 +14,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
 from cbrrt_ompl.figures.drive import draw_computing_times, draw_unknown
-from cbrrt_ompl.figures.drive_history import braking_ahead, plan_ahead, seen_until
+from cbrrt_ompl.figures.drive_history import braking_ahead, plan_ahead, seen_until, view_at
 from cbrrt_ompl.figures.film import LONGEST, Animation, check_animation_file, save_animation
 from cbrrt_ompl.figures.layout import plane_and_curves
 from cbrrt_ompl.figures.player_numbers import drive_numbers, plan_numbers
 from cbrrt_ompl.figures.scene import draw_scene, obstacle_path
-from cbrrt_ompl.figures.style import PATH_COLOR, TREE_COLOR, TURN_COLOR
+from cbrrt_ompl.figures.style import PATH_COLOR, SEEN_COLOR, TREE_COLOR, TURN_COLOR
 from cbrrt_ompl.figures.tree import draw_tree
 from cbrrt_ompl.figures.velocities import draw_velocities
 from cbrrt_ompl.problem.robot import Footprint
@@ -69,7 +69,7 @@ def animate(trajectory: Trajectory, scenario: Scenario, tree: Tree | None = None
 
 
 def animate_drive(result: DriveResult) -> Animation:
-    """Animate a drive: what is known, the plan, the braking that is ready, velocities and computing times.
+    """Animate a drive: what is seen and known, the plan, the braking that is ready, velocities and computing times.
 
     Args:
         result: what :func:`cbrrt_ompl.drive.drive` returned.
@@ -86,6 +86,8 @@ def animate_drive(result: DriveResult) -> Animation:
     (braking,) = plane.plot([], [], color=TREE_COLOR, linewidth=3.0, zorder=4.5, label="braking, ready")
     sensor = Circle((0.0, 0.0), result.settings.sensor_range, fill=False, linestyle=":", linewidth=0.9, zorder=6)
     plane.add_patch(sensor)
+    view = Polygon(np.zeros((3, 2)), facecolor=SEEN_COLOR, edgecolor="none", zorder=0.5)
+    plane.add_patch(view)
     robot = _Robot(plane, scenario, trajectory)
     draw_computing_times(clock, result)
     curves = _Curves(panels.curves, trajectory, scenario)
@@ -101,11 +103,13 @@ def animate_drive(result: DriveResult) -> Animation:
         plan.set_data(*plan_ahead(result, look, t).T)
         braking.set_data(*braking_ahead(result, looks, look, t).T)
         sensor.set_center(trajectory.at(t)[0, :2].tolist())
+        if (outline := view_at(result, t)) is not None:
+            view.set_xy(outline)
         robot.show(t)
         curves.show(t)
         title.show(t)
 
-    moving = [title.text, unseen, seen, plan, braking, sensor, *robot.artists, *curves.artists]
+    moving = [title.text, view, unseen, seen, plan, braking, sensor, *robot.artists, *curves.artists]
     return Animation(panels.figure, trajectory, show, moving, lambda: drive_numbers(result))
 
 

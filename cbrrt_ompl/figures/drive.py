@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PathCollection
+from matplotlib.collections import PathCollection, PolyCollection
 
+from cbrrt_ompl.figures.drive_history import view_at
 from cbrrt_ompl.figures.layout import ShownFigure, plane_and_curves
 from cbrrt_ompl.figures.scene import draw_scene, obstacle_path
-from cbrrt_ompl.figures.style import COMMAND_COLOR, PATH_COLOR, TREE_COLOR, legend_above
+from cbrrt_ompl.figures.style import COMMAND_COLOR, PATH_COLOR, SEEN_COLOR, TREE_COLOR, legend_above
 from cbrrt_ompl.figures.trajectory import draw_trajectory
 from cbrrt_ompl.figures.velocities import draw_velocities
 
@@ -39,6 +40,7 @@ def draw_drive(result: DriveResult) -> ShownFigure:
         parse_math=False,
     )
     draw_scene(plane, scenario)
+    draw_seen(plane, result)
     draw_unknown(plane, result)
     draw_trajectory(plane, trajectory, scenario.robot.footprint)
     starts = np.array([replan.start[:2] for replan in result.replans if replan.trajectory is not None]).reshape(-1, 2)
@@ -57,6 +59,24 @@ def draw_drive(result: DriveResult) -> ShownFigure:
     draw_velocities(panels.curves[:2], trajectory, scenario.robot.limits)
     draw_computing_times(panels.curves[2], result)
     return panels.finish()
+
+
+def draw_seen(ax: Axes, result: DriveResult) -> PolyCollection | None:
+    """Shade what was in line of sight at the looks of a drive, where obstacles hid something.
+
+    Args:
+        ax: axes of the plane.
+        result: what :func:`cbrrt_ompl.drive.drive` returned.
+
+    Returns:
+        The space seen; None where obstacles hid nothing.
+    """
+    views = [view for cycle in result.cycles if (view := view_at(result, cycle.time)) is not None]
+    if not views:
+        return None
+    seen = PolyCollection(views, facecolor=SEEN_COLOR, edgecolor="none", zorder=0.5, label="seen")
+    ax.add_collection(seen, autolim=False)
+    return seen
 
 
 def draw_unknown(ax: Axes, result: DriveResult) -> tuple[PathCollection, PathCollection]:

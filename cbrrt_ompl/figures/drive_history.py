@@ -1,4 +1,4 @@
-"""What a drive knew and was about to do at a time: found obstacles, the plan ahead, the braking that was ready."""
+"""What a drive knew and was about to do at a time: found obstacles, view, plan ahead, the braking that was ready."""
 
 from __future__ import annotations
 
@@ -14,6 +14,14 @@ if TYPE_CHECKING:
 def seen_until(result: DriveResult, look: int) -> set[int]:
     """Identities of the obstacles found up to a look."""
     return {id(obstacle) for cycle in result.cycles[: look + 1] for obstacle in cycle.seen}
+
+
+def view_at(result: DriveResult, t: float) -> NDArray[np.float64] | None:
+    """Outline of what is in line of sight at a time, shape (n, 2) [m]; None where obstacles hid nothing."""
+    if result.sight is None:
+        return None
+    x, y = result.trajectory.at(t)[0, :2].tolist()
+    return result.sight.look(x, y, result.settings.sensor_range).outline(x, y)
 
 
 def plan_ahead(result: DriveResult, look: int, t: float) -> NDArray[np.float64]:

@@ -8,9 +8,10 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from cbrrt_ompl.figures.drive_history import braking_ahead
+from cbrrt_ompl.figures.drive_history import braking_ahead, view_at
 from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, Obstacle
 from cbrrt_ompl.problem.robot import Footprint
 from cbrrt_ompl.trajectory.trajectory import Trajectory
@@ -25,6 +26,9 @@ STEPS = 65_000
 
 GAP = 65_535
 """Between two packed lines."""
+
+VIEW_TOLERANCE = 0.02
+"""By how much the outline of a view may be simplified [m]."""
 
 MOST_ROWS, MOST_TREE_POINTS, MOST_BRAKING_POINTS = 2_000, 60_000, 8
 """Of a trajectory, of a tree and of each braking, so that a page stays below a megabyte."""
@@ -77,6 +81,7 @@ def drive_numbers(result: DriveResult) -> dict[str, Any]:
             "sensor_range": result.settings.sensor_range,
             "cycle": result.settings.cycle,
             "looks": _rounded(looks, 4),
+            "views": [_view(result, float(time), digits) for time in looks],
             "seen": [[place[id(one)] for one in cycle.seen if id(one) in place] for cycle in result.cycles],
             "is_braking": [int(cycle.is_braking) for cycle in result.cycles],
             "computing": _rounded(result.computing_times, 6),
@@ -145,6 +150,15 @@ def _line(start: float, trajectory: Trajectory, digits: int) -> dict[str, Any]:
     rows = np.unique(np.linspace(0, len(trajectory) - 1, min(len(trajectory), 200)).round().astype(int))
     columns = {"t": _rounded(trajectory.t[rows], 3)}
     return {"from": start, **columns, **{name: _rounded(getattr(trajectory, name)[rows], digits) for name in "xy"}}
+
+
+def _view(result: DriveResult, t: float, digits: int) -> list[list[float]]:
+    """Outline of what is in line of sight at a time, none where obstacles hid nothing."""
+    outline = view_at(result, t)
+    if outline is None:
+        return []
+    ring = shapely.simplify(shapely.Polygon(outline), VIEW_TOLERANCE, preserve_topology=False)
+    return _rounded(shapely.get_coordinates(ring), digits)
 
 
 def _outline(obstacle: Obstacle, digits: int) -> dict[str, Any]:
