@@ -25,7 +25,7 @@ from cbrrt_ompl.scenario.scenario import load_scenario
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.verification import verify
 
-COMMANDS = [module.__name__.rpartition(".")[2] for module in program.COMMANDS]
+COMMANDS = list(program.COMMANDS)
 
 OPEN = """
 name: open

@@ -17,6 +17,7 @@ from test_package import tomllib
 from test_readme import blocks
 
 import cbrrt_ompl
+from cbrrt_ompl.cli.program import COMMANDS
 from cbrrt_ompl.planners.registry import PLANNERS
 from cbrrt_ompl.problem.robot import Gains, Limits
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
@@ -29,7 +30,7 @@ SECTIONS: dict[str, Mapping[str, Key]] = {
     **scenario_file.OBSTACLES,
     "map": map_layers.MAP,
     "robot": scenario_file.ROBOT,
-    "robot.footprint": {name: key for keys in footprints.FOOTPRINTS.values() for name, key in keys.items()},
+    "robot.footprint": {name: key for row in footprints.FOOTPRINTS.values() for name, key in row.keys.items()},
     "robot.limits": scenario_file.LIMITS,
     "robot.gains": scenario_file.GAINS,
     "start": scenario_file.START,
@@ -127,6 +128,11 @@ def test_the_index_of_python_leads_to_every_documented_name(docs: Path) -> None:
         name: [entry for entry in page if entry != "cbrrt_ompl.figures"] for name, page in documented(docs).items()
     }
     assert links == {name: page for name, page in entries.items() if page}
+
+
+def test_the_command_line_page_lists_every_command(docs: Path) -> None:
+    page = (docs / "cli.md").read_text(encoding="utf-8")
+    assert re.findall(r"^\| `cbrrt (\w+)` \|", page, flags=re.MULTILINE) == list(COMMANDS)
 
 
 @pytest.fixture(scope="module")

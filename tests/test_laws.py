@@ -19,8 +19,9 @@ from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import InputError, SettingsError
 from cbrrt_ompl.motion import laws
 from cbrrt_ompl.motion.control_laws import kanayama_command
-from cbrrt_ompl.motion.laws import known_laws, law_named, law_origin, posq
+from cbrrt_ompl.motion.laws import known_laws, law_named, law_origin
 from cbrrt_ompl.motion.model import OPEN_LOOP, make_model
+from cbrrt_ompl.motion.posq import posq
 from cbrrt_ompl.problem.obstacles import Bounds, Box
 from cbrrt_ompl.problem.robot import Gains, Limits
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State

@@ -14,33 +14,31 @@ import sys
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from importlib import import_module
 from types import FrameType
 from typing import Any, NoReturn
 
-from cbrrt_ompl.cli import (
-    bench,
-    completion,
-    demo,
-    drive,
-    improve,
-    new,
-    plan,
-    planners,
-    report,
-    reproduce,
-    robots,
-    scenarios,
-    show,
-    verify,
-)
 from cbrrt_ompl.cli.exit_codes import BAD_INPUT, BROKEN_PIPE, INTERRUPTED
 from cbrrt_ompl.cli.output import print_error
 from cbrrt_ompl.errors import CbrrtError, Problem
 
 COMMANDS = (
-    plan, improve, drive, verify, show, new, planners, robots, scenarios, bench, report, reproduce, demo, completion,
-)  # fmt: skip
-"""The modules of the commands, in the order of the help."""
+    "plan",
+    "improve",
+    "drive",
+    "verify",
+    "show",
+    "new",
+    "planners",
+    "robots",
+    "scenarios",
+    "bench",
+    "report",
+    "reproduce",
+    "demo",
+    "completion",
+)
+"""The commands in the order of the help; each is a module beside this one."""
 
 EXAMPLES = """\
 examples:
@@ -119,7 +117,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action=_Version, help="print the version and exit")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for command in COMMANDS:
-        command.add_parser(commands)
+        import_module(f"cbrrt_ompl.cli.{command}").add_parser(commands)
     return parser
 
 

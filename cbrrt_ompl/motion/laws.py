@@ -25,6 +25,7 @@ from numba.extending import intrinsic, overload
 from numpy.typing import NDArray
 
 from cbrrt_ompl.errors import InputError, Problem, SettingsError
+from cbrrt_ompl.motion.posq import posq
 from cbrrt_ompl.problem.robot import Gains, Limits
 
 LawFunction = Callable[[tuple[float, float, float], Any, Any], tuple[float, float]]
@@ -77,6 +78,11 @@ class Law:
             )
 
 
+SHIPPED_LAWS: dict[str, LawFunction] = {
+    "posq": posq,
+}
+"""Laws that come with the package; compiled when they are first asked for, which takes most of a second."""
+
 _laws: dict[str, Law] = {}
 
 
@@ -121,7 +127,7 @@ def register_law(name: str, function: LawFunction) -> None:
 
 def known_laws() -> list[str]:
     """Names of all laws, sorted."""
-    return sorted({KANAYAMA, *_SHIPPED, *_laws})
+    return sorted({KANAYAMA, *SHIPPED_LAWS, *_laws})
 
 
 def law_named(name: str) -> Law | None:
@@ -132,8 +138,8 @@ def law_named(name: str) -> Law | None:
     """
     if name == KANAYAMA:
         return None
-    if name not in _laws and name in _SHIPPED:
-        register_law(name, _SHIPPED[name])
+    if name not in _laws and name in SHIPPED_LAWS:
+        register_law(name, SHIPPED_LAWS[name])
     if name not in _laws:
         raise SettingsError(Problem("planning.law", name, f"one of {', '.join(known_laws())}"))
     return _laws[name]
@@ -315,26 +321,3 @@ def _compiled_law_command(address, error, limits, gains):  # type: ignore[no-unt
         return _call_law(address, error[0], error[1], error[2], limits, gains)
 
     return command
-
-
-# laws that come with the package
-
-
-def posq(error: tuple[float, float, float], limits: Any, gains: Any) -> tuple[float, float]:
-    """POSQ steering: v = K_rho tanh(K_v rho), omega = K_alpha alpha + K_phi phi.
-
-    rho is the distance of the reference, alpha its bearing in the robot's frame, and phi the heading of the reference
-    as seen along that bearing. From L. Palmieri and K. O. Arras, "A novel RRT extend function for efficient and smooth
-    mobile robot motion planning", IROS 2014, with K_v = 3.8, K_alpha = 6, K_phi = -1 as published.
-
-    Note:
-        K_rho is the robot's largest velocity instead of 1 m/s, and the gains of the robot have no part in it.
-    """
-    x, y, theta = error
-    alpha = math.atan2(y, x)
-    phi = (theta - alpha + math.pi) % (2.0 * math.pi) - math.pi
-    return limits.v_max * math.tanh(3.8 * math.hypot(x, y)), 6.0 * alpha - phi
-
-
-_SHIPPED: dict[str, LawFunction] = {"posq": posq}
-"""Laws that come with the package; compiled when they are first asked for, which takes most of a second."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from importlib import import_module
 from typing import Any
 
 from cbrrt_ompl.motion.model import CLOSED_LOOP, STEERING, check_step
@@ -139,7 +140,8 @@ def make_planner(
         made = getattr(oc, row.ompl_class)(si, PositionDecomposition(scenario.world.bounds))
         made.setNumFreeVolumeSamples(FREE_VOLUME_SAMPLES)
     else:
-        made = getattr(oc, row.ompl_class)(si)
+        module, _, name = row.ompl_class.rpartition(".")
+        made = getattr(import_module(module) if module else oc, name)(si)
     made.setName(planner)
     return made
 

@@ -48,7 +48,7 @@ class Planner:
     is_anytime: bool = False
     """Whether it goes on after its first plan."""
     ompl_class: str = "RRT"
-    """Name of its class in ``ompl.control``."""
+    """Name of its class in ``ompl.control``, or of one of ours with its module; made of a SpaceInformation."""
     defaults: FilledSettings = FilledSettings()
     """What stands for settings that are left out."""
     default_gains: Callable[[Limits], Gains] = lambda _: Gains()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.errors import InputError
@@ -12,10 +13,24 @@ from cbrrt_ompl.scenario.sections import Key, Report, build, kind_of, list_of, n
 
 _corners = list_of(pair_of("a point [x, y] of finite numbers [m]"), "a list of corners [[x, y], ...] [m]")
 
-FOOTPRINTS: dict[str, dict[str, Key]] = {
-    "disc": {"radius": Key(number, required="a radius of 0 or more [m]")},
-    "polygon": {"vertices": Key(_corners, required="a list of corners [[x, y], ...] [m] in the robot's frame")},
+
+class FootprintKind(NamedTuple):
+    """A kind of footprint."""
+
+    make: Callable[..., Footprint]
+    """Makes it from the values of its keys."""
+    keys: dict[str, Key]
+    """Its keys besides the type."""
+
+
+FOOTPRINTS = {
+    "disc": FootprintKind(Footprint.disc, {"radius": Key(number, required="a radius of 0 or more [m]")}),
+    "polygon": FootprintKind(
+        Footprint.polygon,
+        {"vertices": Key(_corners, required="a list of corners [[x, y], ...] [m] in the robot's frame")},
+    ),
 }
+"""All kinds by their type."""
 
 
 def footprint(value: object, path: str, report: Report) -> Footprint | None:
@@ -24,9 +39,11 @@ def footprint(value: object, path: str, report: Report) -> Footprint | None:
     A list of corners is a polygon, also inside a text (``"[[0.2, 0.1], ...]"``), and a number is the radius of a disc.
     """
     value = _typed(value)
-    makers = {"disc": Footprint.disc, "polygon": Footprint.polygon}
     kind = kind_of(value, path, FOOTPRINTS, report)
-    return None if kind is None else build(makers[kind], shape_of(value, path, FOOTPRINTS[kind], report), path, report)
+    if kind is None:
+        return None
+    make, keys = FOOTPRINTS[kind]
+    return build(make, shape_of(value, path, keys, report), path, report)
 
 
 def disc(value: object, path: str, report: Report) -> Footprint | None:
@@ -48,7 +65,7 @@ def _typed(value: object) -> object:
     if is_number(value):
         return {"type": "disc", "radius": value}
     if isinstance(value, Mapping) and "type" not in value:
-        kinds = [kind for kind, keys in FOOTPRINTS.items() if keys.keys() & value.keys()]
+        kinds = [kind for kind, row in FOOTPRINTS.items() if row.keys.keys() & value.keys()]
         return {"type": kinds[0], **value} if len(kinds) == 1 else value
     return value
 

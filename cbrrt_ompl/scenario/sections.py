@@ -214,7 +214,7 @@ def pair_of(expected: str) -> Converter:
     return pair
 
 
-def kind_of(value: object, path: str, kinds: Mapping[str, Mapping[str, Key]], report: Report) -> str | None:
+def kind_of(value: object, path: str, kinds: Mapping[str, object], report: Report) -> str | None:
     """The type of a shape."""
     if not isinstance(value, Mapping):
         report.add(path, value, f"a mapping with a type: {', '.join(kinds)}")

@@ -10,13 +10,8 @@ from typing import Any, NamedTuple
 
 from cbrrt_ompl.errors import MISSING, InputError, MapError, Problem, Remark, ScenarioError
 from cbrrt_ompl.files import refusal
-from cbrrt_ompl.scenario.maps.map_files import (
-    IMAGE_SUFFIXES,
-    MAP_SERVER_KEYS,
-    MOVINGAI_SUFFIX,
-    ROS_SUFFIXES,
-    find_beside,
-)
+from cbrrt_ompl.scenario.maps.formats import format_of
+from cbrrt_ompl.scenario.maps.map_files import MAP_SERVER_KEYS, ROS_SUFFIXES, find_beside
 from cbrrt_ompl.scenario.plain_yaml import read_yaml
 from cbrrt_ompl.scenario.sections import Report
 
@@ -77,12 +72,14 @@ def is_map(path: Path) -> bool:
 
 
 def has_no_scale(path: Path) -> bool:
-    """Whether a map does not tell the size of its cells: all but those of map_server."""
-    return _is_map_by_suffix(path)
+    """Whether a map does not tell the size of its cells."""
+    kind = format_of(path)
+    return kind is not None and not kind.tells_resolution
 
 
 def _is_map_by_suffix(path: Path) -> bool:
-    return path.suffix.lower() in (MOVINGAI_SUFFIX, *IMAGE_SUFFIXES)
+    """Whether a file is a map whatever it holds; a YAML file may be a scenario as well."""
+    return path.suffix.lower() not in ROS_SUFFIXES and format_of(path) is not None
 
 
 def _is_map_server(data: object) -> bool:
@@ -169,7 +166,7 @@ def _check_size(grid: Path, columns: int, rows: int, where: str) -> None:
     from cbrrt_ompl.scenario.maps.movingai import read_movingai
 
     try:
-        found = read_movingai(grid).shape
+        found = read_movingai(grid).cells.shape
     except MapError as error:
         raise ScenarioError(error.problems, error.source) from None
     if found != (rows, columns):

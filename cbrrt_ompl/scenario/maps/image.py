@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cbrrt_ompl.collision.occupancy import FREE, FREE_THRESHOLD, OCCUPIED, OCCUPIED_THRESHOLD, UNKNOWN
+from cbrrt_ompl.scenario.maps.map_files import MapFile
 from cbrrt_ompl.scenario.maps.pixels import Pixels, read_pixels
 
 MODES = ("trinary", "scale", "raw")
@@ -31,19 +32,19 @@ class Reading(NamedTuple):
     """Pixels at most as likely occupied as this are free; without meaning in ``raw``."""
 
 
-def read_image(path: Path) -> NDArray[np.int8]:
+def read_image(path: Path) -> MapFile:
     """Cells of an image without further data: dark is occupied, bright free, transparent unknown.
 
     Args:
         path: the image file.
 
     Returns:
-        ``OCCUPIED``, ``FREE`` or ``UNKNOWN``, the lowest row first, shape (rows, columns).
+        The cells.
 
     Raises:
         MapError: if it cannot be read.
     """
-    return cells_of(read_pixels(path), Reading())
+    return MapFile(cells_of(read_pixels(path), Reading()))
 
 
 def cells_of(pixels: Pixels, reading: Reading) -> NDArray[np.int8]:

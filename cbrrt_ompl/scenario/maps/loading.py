@@ -8,10 +8,7 @@ from pathlib import Path
 from cbrrt_ompl.collision.occupancy import OCCUPIED
 from cbrrt_ompl.errors import MISSING, MapError, Problem, Remark
 from cbrrt_ompl.files import as_path
-from cbrrt_ompl.scenario.maps.image import read_image
-from cbrrt_ompl.scenario.maps.map_files import IMAGE_SUFFIXES, MOVINGAI_SUFFIX, ROS_SUFFIXES
-from cbrrt_ompl.scenario.maps.map_server import read_map_server
-from cbrrt_ompl.scenario.maps.movingai import read_movingai
+from cbrrt_ompl.scenario.maps.formats import format_of, map_suffixes
 from cbrrt_ompl.scenario.maps.occupancy_map import OccupancyMap
 
 
@@ -41,23 +38,17 @@ def load_map(
         MapError: if it cannot be read, in one line a mistake, or if every cell is occupied.
     """
     path = as_path(path, MapError)
-    suffix = path.suffix.lower()
-    remarks: tuple[str, ...] = ()
-    if suffix in ROS_SUFFIXES:
-        cells, own_resolution, own_origin, remarks = read_map_server(path)
-        resolution = own_resolution if resolution is None else resolution
-        origin = own_origin if origin is None else origin
-    elif suffix != MOVINGAI_SUFFIX and suffix not in IMAGE_SUFFIXES:
-        known = ", ".join((*ROS_SUFFIXES, MOVINGAI_SUFFIX, *IMAGE_SUFFIXES))
-        raise MapError(Problem("suffix", suffix or MISSING, f"one of {known}"), str(path))
-    elif resolution is None:
-        raise MapError(
-            Problem("resolution", MISSING, "the side of a cell [m], which the file does not tell"), str(path)
-        )
-    else:
-        cells = read_movingai(path) if suffix == MOVINGAI_SUFFIX else read_image(path)
-    pose = (0.0, 0.0, 0.0) if origin is None else origin
-    found = OccupancyMap(cells, resolution, pose, unknown, str(path), remarks)  # type: ignore[arg-type]  # checked
+    kind = format_of(path)
+    if kind is None:
+        expected = f"one of {', '.join(map_suffixes())}"
+        raise MapError(Problem("suffix", path.suffix.lower() or MISSING, expected), str(path))
+    if resolution is None and not kind.tells_resolution:
+        expected = "the side of a cell [m], which the file does not tell"
+        raise MapError(Problem("resolution", MISSING, expected), str(path))
+    cells, own_resolution, own_origin, remarks = kind.read(path)
+    resolution = own_resolution if resolution is None else resolution
+    origin = own_origin if origin is None else origin
+    found = OccupancyMap(cells, resolution, origin, unknown, str(path), remarks)  # type: ignore[arg-type]  # checked
     if not may_be_full and (found.cells == OCCUPIED).all():
         raise MapError(Problem("cells", Remark("only occupied ones"), "a free one"), str(path))
     return found

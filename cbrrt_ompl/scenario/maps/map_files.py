@@ -4,14 +4,30 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 ROS_SUFFIXES = (".yaml", ".yml")
-MOVINGAI_SUFFIX = ".map"
 IMAGE_SUFFIXES = (".bmp", ".gif", ".jpeg", ".jpg", ".pbm", ".pgm", ".png", ".ppm", ".tif", ".tiff")
-"""What the names of maps end in, by their kind."""
+"""What the names of map_server's files and of images end in."""
 
 MAP_SERVER_KEYS = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
 """Keys of a map_server file, by which it is told from other YAML files."""
+
+
+class MapFile(NamedTuple):
+    """What the file of a map holds."""
+
+    cells: NDArray[np.int8]
+    """``OCCUPIED``, ``FREE`` or ``UNKNOWN``, the lowest row first, shape (rows, columns)."""
+    resolution: float | None = None
+    """Side of a cell [m]; None where the file does not tell it."""
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Pose (x, y, yaw) of the lower left corner [m, m, rad]."""
+    remarks: tuple[str, ...] = ()
+    """What was not taken as it was written, a line each."""
 
 
 def find_beside(name: str, folder: Path) -> tuple[Path | None, str]:

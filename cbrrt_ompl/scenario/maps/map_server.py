@@ -6,17 +6,16 @@ import glob
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.collision.occupancy import FREE, FREE_THRESHOLD, OCCUPIED, OCCUPIED_THRESHOLD, UNKNOWN
 from cbrrt_ompl.errors import MISSING, InputError, MapError, Problem
 from cbrrt_ompl.files import write_files
 from cbrrt_ompl.scenario.maps.image import MODES, UNKNOWN_GREY, Reading, cells_of
-from cbrrt_ompl.scenario.maps.map_files import IMAGE_SUFFIXES, find_beside
+from cbrrt_ompl.scenario.maps.map_files import IMAGE_SUFFIXES, MapFile, find_beside
 from cbrrt_ompl.scenario.maps.pixels import read_pixels
 from cbrrt_ompl.scenario.plain_yaml import dump_line, read_yaml
 
@@ -27,20 +26,7 @@ _GREYS = {OCCUPIED: 0, FREE: 254, UNKNOWN: UNKNOWN_GREY}
 """What map_saver writes."""
 
 
-class MapServerMap(NamedTuple):
-    """What a map_server file holds."""
-
-    cells: NDArray[np.int8]
-    """The lowest row first, shape (rows, columns)."""
-    resolution: float
-    """Side of a cell [m]."""
-    origin: tuple[float, float, float]
-    """Pose (x, y, yaw) of the lower left corner [m, m, rad]."""
-    remarks: tuple[str, ...]
-    """What was not taken as it was written, a line each."""
-
-
-def read_map_server(path: Path) -> MapServerMap:
+def read_map_server(path: Path) -> MapFile:
     """Cells, resolution and origin of a ROS map.
 
     Required are ``image``, ``resolution`` and ``origin``. Where they are left out, ``mode`` is ``trinary``, ``negate``
@@ -70,7 +56,7 @@ def read_map_server(path: Path) -> MapServerMap:
     reading = _reading(data, problems)
     if problems or image is None or resolution is None or origin is None:
         raise MapError(problems, str(path))
-    return MapServerMap(cells_of(read_pixels(image), reading), resolution, origin, tuple(remarks))
+    return MapFile(cells_of(read_pixels(image), reading), resolution, origin, tuple(remarks))
 
 
 def write_map_server(grid: OccupancyMap, path: Path) -> None:

@@ -10,19 +10,20 @@ from numpy.typing import NDArray
 from cbrrt_ompl.collision.occupancy import FREE, MAX_CELLS, OCCUPIED, check_cell_count
 from cbrrt_ompl.errors import MISSING, MapError, Problem, Remark
 from cbrrt_ompl.files import refusal
+from cbrrt_ompl.scenario.maps.map_files import MapFile
 
 FREE_TERRAIN, BLOCKED_TERRAIN = b".GS", b"@OTW"
 """Ground and swamp can be driven on; out of bounds, trees and water can not."""
 
 
-def read_movingai(path: Path) -> NDArray[np.int8]:
+def read_movingai(path: Path) -> MapFile:
     """Cells of a MovingAI map.
 
     Args:
         path: the ``.map`` file.
 
     Returns:
-        ``OCCUPIED`` or ``FREE``, the lowest row first, shape (rows, columns).
+        The cells, ``OCCUPIED`` or ``FREE``.
 
     Raises:
         MapError: with the line that is wrong.
@@ -34,7 +35,7 @@ def read_movingai(path: Path) -> NDArray[np.int8]:
         raise MapError(Problem("", refusal(error), "a file that can be read"), str(path)) from None
     try:
         first, columns, rows = _header(lines)
-        return _cells(lines, first, columns, rows)
+        return MapFile(_cells(lines, first, columns, rows))
     except MapError as error:
         raise MapError(error.problems, str(path)) from None
 

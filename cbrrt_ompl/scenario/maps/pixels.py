@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from cbrrt_ompl.collision.occupancy import check_cell_count
 from cbrrt_ompl.errors import MapError, Problem, Remark
@@ -43,6 +42,8 @@ def read_pixels(path: Path) -> Pixels:
     Raises:
         MapError: if there is no such file, or it is no such image, too large or cut off.
     """
+    from PIL import Image  # here, since scenarios without a map need none
+
     source = str(path)
     try:
         with warnings.catch_warnings():
