@@ -11,27 +11,34 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from test_code_blocks import blocks_of
 
 from cbrrt_ompl import load_scenario, plan
 from cbrrt_ompl.planners.registry import PLANNERS
 
-PAGE = "docs/contributing.md"
+NEW = re.compile(
+    r"^New, `(\S+)`:\n\n<!-- not run: a module of the package -->\n```python\n(.*?)^```$", re.MULTILINE | re.DOTALL
+)
+ROW = re.compile(
+    r"^A row of `(\w+)` in `(\S+)`:\n\n<!-- not run: a row of a table -->\n```\w+\n(.*?)^```$", re.MULTILINE | re.DOTALL
+)
 
 
 @pytest.fixture(scope="module")
-def extended(repository: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def page(repository: Path) -> str:
+    return (repository / "docs" / "contributing.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def extended(repository: Path, page: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a copy of the package to which all that the page shows was added."""
     root = tmp_path_factory.mktemp("extended")
     for folder in ("cbrrt_ompl", "scenarios"):
         shutil.copytree(repository / folder, root / folder, ignore=shutil.ignore_patterns("__pycache__"))
-    for block in blocks_of(PAGE):
-        mark = block.mark.get("not run", "")
-        if new := re.fullmatch(r"(\S+) is new", mark):
-            assert not (root / new[1]).exists()
-            (root / new[1]).write_text(block.code, encoding="utf-8")
-        elif row := re.fullmatch(r"a row of (\w+) in (\S+)", mark):
-            add_row(root / row[2], row[1], block.code)
+    for file, code in NEW.findall(page):
+        assert not (root / file).exists()
+        (root / file).write_text(code, encoding="utf-8")
+    for table, file, code in ROW.findall(page):
+        add_row(root / file, table, code)
     return root
 
 
@@ -59,9 +66,11 @@ def run(extended: Path, *arguments: str) -> str:
     return done.stdout
 
 
-def test_the_page_adds_one_file_and_one_row_for_each() -> None:
-    marks = [block.mark.get("not run", "") for block in blocks_of(PAGE)]
-    assert sum(mark.endswith(" is new") for mark in marks) == sum(mark.startswith("a row of ") for mark in marks) == 5
+def test_the_page_adds_one_file_and_one_row_for_each(page: str) -> None:
+    recipes = re.split(
+        r"^### ", page.partition("\n## Add something\n")[2].partition("\n### What takes more")[0], flags=re.MULTILINE
+    )
+    assert [(len(NEW.findall(recipe)), len(ROW.findall(recipe))) for recipe in recipes[1:]] == [(1, 1)] * 5
 
 
 @pytest.mark.slow
