@@ -14,7 +14,7 @@ from cbrrt_ompl.ompl_plugin.binding import ob, oc
 from cbrrt_ompl.ompl_plugin.extender import Extender
 from cbrrt_ompl.ompl_plugin.goals import region_of
 from cbrrt_ompl.ompl_plugin.space import write_state
-from cbrrt_ompl.ompl_plugin.user_parts import Query, check_parts, is_same_part, query_of
+from cbrrt_ompl.ompl_plugin.user_parts import Query, check_parts, check_sampling, is_same_part, query_of
 from cbrrt_ompl.ompl_plugin.warm_up import warm_up
 from cbrrt_ompl.planners.registry import planner_named, scenario_for
 from cbrrt_ompl.planners.search import Search
@@ -58,11 +58,12 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
         """Compile, and refuse what this planner cannot take.
 
         Raises:
-            SettingsError: see :func:`cbrrt_ompl.ompl_plugin.user_parts.check_parts`.
+            SettingsError: see :func:`cbrrt_ompl.ompl_plugin.user_parts.check_parts` and
+                :func:`cbrrt_ompl.ompl_plugin.user_parts.check_sampling`.
         """
         warm_up()
         warm_up_search()
-        check_parts(self.getSpaceInformation(), self._scenario, self.getName())
+        self._check()
         super().setup()
 
     def clear(self) -> None:
@@ -80,8 +81,8 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
             interval: of looking at a function, as OMPL has it; not needed here.
         """
         self.checkValidity()
-        si, problem = self.getSpaceInformation(), self.getProblemDefinition()
-        check_parts(si, self._scenario, self.getName())
+        problem = self.getProblemDefinition()
+        self._check()
         should_stop = condition if callable(condition) else ob.timedPlannerTerminationCondition(float(condition))
         self._forget_what_has_changed(problem)
         if self.search is None:
@@ -94,6 +95,12 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
             return ob.PlannerStatus(ob.PlannerStatus.TIMEOUT)
         self._conclude(problem, lambda: bool(should_stop()))
         return ob.PlannerStatus(ob.PlannerStatus.EXACT_SOLUTION)
+
+    def _check(self) -> None:
+        """Refuse what this planner cannot take."""
+        si = self.getSpaceInformation()
+        check_parts(si, self._scenario, self.getName())
+        check_sampling(si.getStateSpace(), self.getName())
 
     def _conclude(self, problem: Any, should_stop: Callable[[], bool]) -> None:
         """Hand over the solution; what is left of the time may be used."""
@@ -117,7 +124,7 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
             is_same = self._query is not None and self._query.is_continued_by(query)
             is_same = is_same and self._query is not None and len(self._query.starts) == len(query.starts)
             is_same = is_same and is_same_part(self._goal[0], goal, "ompl::base::Goal") and self._goal[1] == region
-            if not is_same or (self.search.has_reached_goal and not goal.isSatisfied(self._last_state()())):
+            if not is_same or (self.search.has_reached_goal and not self._ends_in(goal)):
                 self.clear()
         self._query, self._goal = query, (goal, region)
 
@@ -150,10 +157,11 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
             return Search(extender.model, world, footprint, starts, neighbours=neighbours, **settings)
         return AskedSearch(extender, si, self._goal[0], scenario, starts, **settings)
 
-    def _last_state(self) -> Any:
-        """The node added last, a scoped state."""
+    def _ends_in(self, goal: Any) -> bool:
+        """Whether the node added last is in a goal."""
         assert self.search is not None
-        return self._state(self.search.edges()[0][-1])
+        state = self._state(self.search.edges()[0][-1])  # named, for OMPL sees only what it points to
+        return bool(goal.isSatisfied(state()))
 
     def getPlannerData(self, data: Any) -> None:  # noqa: N802  # OMPL's name
         """Give copies of all nodes and edges away."""

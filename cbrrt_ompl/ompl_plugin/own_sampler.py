@@ -73,6 +73,10 @@ class OwnSampler:
         super().clear()  # type: ignore[misc]  # OMPL's
         self.sampler = None
 
+    def clearQuery(self) -> None:  # noqa: N802  # OMPL's name
+        """Forget tree and sampler: what OMPL's method says that it does, which calls itself without end instead."""
+        self.clear()
+
     @contextmanager
     def _own_sampler(self) -> Iterator[None]:
         """Have the space information allocate this planner's sampler."""

@@ -19,6 +19,10 @@ FREE_PLANNERS = "rrt, kpiece1, est, sst, pdst, syclop-rrt and syclop-est"
 """Planners that draw their controls from the control space."""
 
 
+DEFAULT_STATE_SAMPLERS = {"CompoundStateSampler", "RealVectorStateSampler", "SO2StateSampler"}
+"""What a space of ours and its components allocate if nothing else is set."""
+
+
 class Query(NamedTuple):
     """What a tree is grown with."""
 
@@ -112,5 +116,29 @@ def check_parts(si: Any, scenario: Scenario, planner: str) -> None:
             f"False with a validity checker of one's own, of which {planner} cannot tell where the robot can brake"
         )
         problems.append(Problem("planning.brake_safe", True, expected))
+    if problems:
+        raise SettingsError(problems, source=planner)
+
+
+def check_sampling(space: Any, planner: str) -> None:
+    """Refuse a state space by which the compiled planners, with samples and distances of their own, do not go.
+
+    Args:
+        space: the state space.
+        planner: the planner's name.
+
+    Raises:
+        SettingsError: if the space or a component has a state sampler that is not OMPL's, or other weights than 1, 0, 0.
+    """
+    problems = []
+    found = [type(part.allocStateSampler()).__name__ for part in (space, *map(space.getSubspace, range(3)))]
+    others = [name for name in found if name not in DEFAULT_STATE_SAMPLERS]
+    if others:
+        expected = f"OMPL's own, since {planner} draws its samples in compiled code; cb-rrt and s-rrt take others"
+        problems.append(Problem("state sampler", others[0], expected))
+    weights = [space.getSubspaceWeight(i) for i in range(3)]
+    if weights != [1.0, 0.0, 0.0]:
+        expected = f"[1.0, 0.0, 0.0], by which {planner} finds the nearest node; cb-rrt and s-rrt take others"
+        problems.append(Problem("weights of the state space", weights, expected))
     if problems:
         raise SettingsError(problems, source=planner)
