@@ -128,7 +128,7 @@ def check_sampling(space: Any, planner: str) -> None:
         planner: the planner's name.
 
     Raises:
-        SettingsError: if the space or a component has a state sampler that is not OMPL's, or other weights than 1, 0, 0.
+        SettingsError: if the space or a component has a state sampler that is not OMPL's, or the weights are others.
     """
     problems = []
     found = [type(part.allocStateSampler()).__name__ for part in (space, *map(space.getSubspace, range(3)))]
