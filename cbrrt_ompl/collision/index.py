@@ -48,8 +48,11 @@ SQUARE = np.dtype(
 MOST_SQUARES = 512
 """Squares that wait at once: three for every level, of which doubles have no more than these."""
 
-LONG_LIST = 4
-"""Lists up to this length are not worth shortening."""
+LONG_LIST, LONG_LIST_OF_MANY = 4, 8
+"""Lists up to this length are not worth shortening: among few pieces, and among many, whose index takes its time."""
+
+MANY = 500
+"""More pieces than these are many."""
 
 FINEST = 0.08
 """Cells are split while a circle around their children is larger than this [m]."""
@@ -85,10 +88,11 @@ def build_index(world: Pieces, frame: Record) -> tuple[Records, NDArray[np.int32
         cells along a side of the square.
     """
     obstacles = len(world.pieces) - frame["parts"]
-    levels = min(MOST_ROOTS, 2 + math.ceil(0.5 * math.log2(obstacles + 1.0)))
+    is_large = obstacles > MANY
+    levels = min(MOST_ROOTS, (1 if is_large else 2) + math.ceil(0.5 * math.log2(obstacles + 1.0)))
     side = side_of(frame)
     middle = 0.5 * (frame["x_min"] + frame["x_min"] + side), 0.5 * (frame["y_min"] + frame["y_min"] + side)
-    room = 16 * (4**levels + obstacles)
+    room = 4 * (4**levels + 4 * obstacles)
     while True:
         cells, listed = record_array(room, CELL), np.empty(room, dtype=np.int32)
         candidates, distances = np.empty(room, dtype=np.int32), np.empty(room)
@@ -101,6 +105,7 @@ def build_index(world: Pieces, frame: Record) -> tuple[Records, NDArray[np.int32
             frame,
             side,
             levels,
+            LONG_LIST_OF_MANY if is_large else LONG_LIST,
             cells,
             listed,
             squares,
@@ -124,6 +129,7 @@ def _build(
     frame: Record,
     side_of_all: float,
     levels: int,
+    long_list: int,
     cells: Records,
     listed: NDArray[np.int32],
     squares: Records,
@@ -138,6 +144,7 @@ def _build(
         frame: see :func:`build_index`.
         side_of_all: of the whole [m].
         levels: above the root cells.
+        long_list: length up to which lists are not worth shortening.
         cells: room for the cells, zeros.
         listed: room for the numbers of the pieces in the lists of the leaves.
         squares: room for squares that wait, the first of which is the whole; records of type `SQUARE`.
@@ -184,7 +191,7 @@ def _build(
                 candidates[end], distances[end] = candidates[k], distances[k]
                 end += 1
         is_full = count > MOST_LISTED + 8 * len(pieces)
-        if is_full or not _is_worth_splitting(frame, finest, nearest, radius, end - start):
+        if is_full or not _is_worth_splitting(frame, finest, long_list, nearest, radius, end - start):
             for k in range(start, end):
                 listed[count + k - start] = candidates[k]
             width = 1 << max(levels - level, 0)  # root cells that this leaf stands for
@@ -212,12 +219,15 @@ def _build(
 
 
 @inner_kernel
-def _is_worth_splitting(frame: Record, finest: float, clearance: float, radius: float, length: int) -> bool:
+def _is_worth_splitting(
+    frame: Record, finest: float, long_list: int, clearance: float, radius: float, length: int
+) -> bool:
     """Whether the children of a cell answer faster than the cell.
 
     Args:
         frame: see :func:`build_index`.
         finest: radius down to which cells are split [m].
+        long_list: see :func:`_build`.
         clearance: distance of its centre from everything [m].
         radius: of the circle around it [m].
         length: pieces in its list.
@@ -226,5 +236,5 @@ def _is_worth_splitting(frame: Record, finest: float, clearance: float, radius: 
         return False
     room = clearance - frame.outer
     if radius > room:  # somewhere in the cell pieces have to be looked at
-        return length > LONG_LIST and 0.5 * radius > finest
+        return length > long_list and 0.5 * radius > finest
     return radius > GOOD_BOUND * room and radius > COARSEST

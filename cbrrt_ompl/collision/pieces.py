@@ -71,21 +71,31 @@ def join(parts: Iterable[Pieces]) -> Pieces:
 
 
 def obstacle_pieces(obstacles: Sequence[Obstacle]) -> Pieces:
-    """The pieces of obstacles, kind after kind.
+    """The pieces of obstacles, kind after kind; of equal ones those of one.
 
     Args:
         obstacles: boxes, discs and polygons.
     """
-    boxes = [(*o.min, *o.max) for o in obstacles if isinstance(o, Box)]
-    turned = [(*o.center, *o.size, o.angle) for o in obstacles if isinstance(o, OrientedBox)]
-    discs = [(*o.center, o.radius) for o in obstacles if isinstance(o, Disc)]
-    x0, y0, x1, y1 = np.array(boxes, dtype=float).reshape(-1, 4).T
+    boxes: dict[tuple[float, ...], None] = {}  # of numbers, which are compared sooner than obstacles
+    turned: dict[tuple[float, ...], None] = {}
+    discs: dict[tuple[float, ...], None] = {}
+    polygons: dict[Polygon, None] = {}
+    for obstacle in obstacles:
+        if isinstance(obstacle, Box):
+            boxes[obstacle.min + obstacle.max] = None
+        elif isinstance(obstacle, OrientedBox):
+            turned[(*obstacle.center, *obstacle.size, obstacle.angle)] = None
+        elif isinstance(obstacle, Disc):
+            discs[(*obstacle.center, obstacle.radius)] = None
+        else:
+            polygons[obstacle] = None
+    x0, y0, x1, y1 = np.array(list(boxes), dtype=float).reshape(-1, 4).T
     straight = _simple_pieces(RECTANGLE, 0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (x1 - x0), 0.5 * (y1 - y0))
-    x, y, width, height, angle = np.array(turned, dtype=float).reshape(-1, 5).T
+    x, y, width, height, angle = np.array(list(turned), dtype=float).reshape(-1, 5).T
     tilted = _simple_pieces(RECTANGLE, x, y, 0.5 * width, 0.5 * height, angle)
-    x, y, radius = np.array(discs, dtype=float).reshape(-1, 3).T
+    x, y, radius = np.array(list(discs), dtype=float).reshape(-1, 3).T
     round_ones = _simple_pieces(DISC, x, y, radius, radius)
-    with_corners = join(polygon_pieces(o) for o in obstacles if isinstance(o, Polygon))
+    with_corners = join(polygon_pieces(polygon) for polygon in polygons)
     return with_corners._replace(pieces=np.concatenate([straight, tilted, round_ones, with_corners.pieces]))
 
 

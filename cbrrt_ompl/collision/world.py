@@ -200,7 +200,7 @@ class World(Shown):
     @cached_property
     def pieces(self) -> Pieces:
         """The obstacles as convex pieces."""
-        loose = obstacle_pieces(tuple(dict.fromkeys(self._loose)))
+        loose = obstacle_pieces(self._loose)
         return loose if self.layer is None else join((self.layer.pieces, loose))
 
     def scene(self, footprint: Footprint) -> Scene:
