@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import shutil
 import uuid
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from cbrrt_ompl.errors import InputError, Problem, Refusal, Remark
+from cbrrt_ompl.errors import CbrrtError, InputError, Problem, Refusal, Remark
 
 
 def as_path(path: object, error: type[InputError]) -> Path:
@@ -92,6 +92,27 @@ def write_files(contents: Mapping[Path, bytes | str], error: type[InputError] = 
         for draft, _ in drafts:
             with suppress(OSError):  # gone into its place, or never made
                 draft.unlink()
+
+
+@contextmanager
+def locked(folder: Path, occupied: str) -> Iterator[None]:
+    """Keep other processes out of a folder that they lock as well.
+
+    Args:
+        folder: the folder.
+        occupied: what to say where another one is using it.
+
+    Raises:
+        CbrrtError: if another one is using it.
+    """
+    import fcntl  # here, since Windows has none
+
+    with open(folder / ".lock", "w") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise CbrrtError(f"{folder}: {occupied}") from None
+        yield
 
 
 def _write_draft(draft: Path, target: Path, data: bytes) -> None:

@@ -21,8 +21,9 @@ from cbrrt_ompl.optimise.anytime import further_guesses, robust_search
 from cbrrt_ompl.optimise.improving import Found, Improver, check_improvement, geodesic_guesses
 from cbrrt_ompl.optimise.improving import warm_up as warm_up_improvement
 from cbrrt_ompl.optimise.objective import Objective
+from cbrrt_ompl.planners.first_plan import FirstPlan
 from cbrrt_ompl.planners.registry import PLANNERS, is_compiled, law_of, planner_named, scenario_for
-from cbrrt_ompl.planners.search import Search, search_in
+from cbrrt_ompl.planners.search import search_in
 from cbrrt_ompl.planners.warm_up import warm_up
 from cbrrt_ompl.problem.robot import Footprint
 from cbrrt_ompl.problem.settings import Goal
@@ -188,8 +189,12 @@ def plan(
 def _first_plan(scenario: Scenario, planner: str, seed: int | None, watch: _Watch) -> PlanResult:
     """What a planner finds first."""
     if is_compiled(planner):
-        return _plan_compiled(scenario, planner, seed, watch)
-    return _plan_in_ompl(scenario, planner, seed, watch)
+        found = _plan_compiled(scenario, planner, seed, watch)
+    else:
+        from cbrrt_ompl.ompl_plugin.run import run  # here, so that the compiled planners need no OMPL
+
+        found = run(scenario, planner, seed, watch.start, watch.should_stop)
+    return _result_of(found, planner, seed, watch.ended_by)
 
 
 def available_planners() -> list[str]:
@@ -210,7 +215,7 @@ def _plan_anytime(
         improver.run(geodesic_guesses(scenario))
         if improver.best is None:
             search.run(watch.should_stop, most)
-    result = _result_of(search, planner, seed, watch)
+    result = _result_of(search.first_plan(watch.elapsed()), planner, seed, watch.ended_by)
     improver.begin(budget, watch.began)
     if search.has_reached_goal:
         improver.improve(search.trajectory(), planner)
@@ -264,45 +269,25 @@ def _check_arguments(seed: object, time_limit: object, progress: object) -> None
         raise SettingsError(problems)
 
 
-def _plan_compiled(scenario: Scenario, planner: str, seed: int | None, watch: _Watch) -> PlanResult:
+def _plan_compiled(scenario: Scenario, planner: str, seed: int | None, watch: _Watch) -> FirstPlan:
     """Plan with the compiled loop, without OMPL."""
     row = PLANNERS[planner]
     search = search_in(scenario, row.law(scenario.planning), seed, robust=row.is_robust)
     watch.start()
     search.run(watch.should_stop, scenario.planning.filled().max_samples)
-    return _result_of(search, planner, seed, watch)
+    return search.first_plan(watch.elapsed())
 
 
-def _result_of(search: Search, planner: str, seed: int | None, watch: _Watch) -> PlanResult:
-    """What came of a search by the compiled loop."""
-    planning_time = watch.elapsed()
-    return PlanResult(
-        planner=planner,
-        seed=seed,
-        status=SOLVED if search.has_reached_goal else watch.ended_by,
-        trajectory=search.trajectory() if search.has_reached_goal else None,
-        count_nodes=partial(_given, search.nodes),
-        samples=search.samples,
-        planning_time=planning_time,
-        make_tree=search.tree,
-    )
+def _result_of(found: FirstPlan, planner: str, seed: int | None, status: str) -> PlanResult:
+    """The result of a planner.
 
-
-def _plan_in_ompl(scenario: Scenario, planner: str, seed: int | None, watch: _Watch) -> PlanResult:
-    """Plan with a planner that OMPL runs."""
-    from cbrrt_ompl.ompl_plugin.run import run  # here, so that the compiled planners need no OMPL
-
-    found = run(scenario, planner, seed, watch.start, watch.should_stop)
-    return PlanResult(
-        planner=planner,
-        seed=seed,
-        status=SOLVED if found.trajectory is not None else watch.ended_by,
-        trajectory=found.trajectory,
-        count_nodes=found.count_nodes,
-        samples=found.samples,
-        planning_time=found.planning_time,
-        make_tree=found.make_tree,
-    )
+    Args:
+        found: what it came back with.
+        planner: its name.
+        seed: that was asked for.
+        status: why it ended, if it has no trajectory.
+    """
+    return PlanResult(planner, seed, status if found.trajectory is None else SOLVED, *found)
 
 
 def approachable_goal(scenario: Scenario) -> Goal:
@@ -337,7 +322,8 @@ def _already_there(scenario: Scenario, planner: str, seed: int | None) -> PlanRe
     start = np.array([scenario.start], dtype=float)
     stay = trajectory_from_controls(start[0], np.empty((0, 3)), np.empty(0, dtype=np.int64), model)
     tree = Tree(start, np.array([-1]), np.empty((0, 2)))
-    return PlanResult(planner, seed, SOLVED, stay, partial(_given, 1), 0, 0.0, partial(_given, tree), scenario=scenario)
+    found = FirstPlan(stay, partial(_given, 1), 0, 0.0, partial(_given, tree))
+    return replace(_result_of(found, planner, seed, SOLVED), scenario=scenario)
 
 
 def _given(value: T) -> T:

@@ -22,8 +22,8 @@ import pytest
 
 from cbrrt_ompl import Scenario, load_scenario, plan
 from cbrrt_ompl.benchmark import campaign as campaign_module
-from cbrrt_ompl.benchmark import case as case_module
 from cbrrt_ompl.benchmark import cluster
+from cbrrt_ompl.benchmark import job as job_module
 from cbrrt_ompl.benchmark.campaign import Campaign, load_scenarios, run_campaign, run_seeds
 from cbrrt_ompl.benchmark.case import Case
 from cbrrt_ompl.benchmark.cluster import run_on_cluster
@@ -106,9 +106,10 @@ time REAL
 FAKE_CASE = """
 import json, os, sys, time
 from dataclasses import replace
-from cbrrt_ompl.benchmark.case import Case, crash_log, die_with_parent
+from cbrrt_ompl.benchmark.case import Case, crash_log
+from cbrrt_ompl.benchmark.job import die_with_parent
 from cbrrt_ompl.benchmark.log import format_log
-die_with_parent(int(sys.argv[2]))
+die_with_parent(int(sys.argv[3]))
 data = json.load(sys.stdin)
 case = Case(**{**data, "seeds": tuple(data["seeds"])})
 if case.planner == "est":
@@ -118,7 +119,7 @@ time.sleep(1000 if case.planner == "pdst" else case.time_limit)
 log = crash_log(case, ("goal_bias = 0.05",))
 runs = tuple((str(seed), "1", "6") for seed in case.seeds)
 log = replace(log, planners=(replace(log.planners[0], runs=runs),))
-open(sys.argv[1], "w").write(format_log(log))
+open(sys.argv[2], "w").write(format_log(log))
 """
 """A case that needs its time limit and says that all runs are solved; est crashes, pdst hangs."""
 
@@ -140,7 +141,7 @@ def fake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Cases of a few milliseconds, without OMPL."""
     path = tmp_path / "fake.py"
     path.write_text(FAKE_CASE, encoding="utf-8")
-    monkeypatch.setattr(case_module, "COMMAND", (sys.executable, str(path)))
+    monkeypatch.setattr(job_module, "COMMAND", (sys.executable, str(path)))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(path for path in sys.path if path))
     return path
 
@@ -486,9 +487,9 @@ def test_a_crash_or_a_hang_costs_its_case_alone(field: Scenario, fake: Path, tmp
 
 CAMPAIGN_CODE = """
 import sys
-from cbrrt_ompl.benchmark import campaign, case
+from cbrrt_ompl.benchmark import campaign, job
 from cbrrt_ompl.cli import main
-case.COMMAND = (sys.executable, {fake!r})
+job.COMMAND = (sys.executable, {fake!r})
 campaign.RUNS_PER_CASE = 1
 sys.exit(main(["bench", {scenario!r}, "--planner", *"rrt sst".split(), "--runs", "8", "--time-limit", "0.2",
                "--database", "a.db", "--log-dir", "logs", "--jobs", "2"]))

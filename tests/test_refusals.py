@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cbrrt_ompl.benchmark import case as case_module
+from cbrrt_ompl.benchmark import job as job_module
 from cbrrt_ompl.benchmark.campaign import Campaign
 from cbrrt_ompl.benchmark.case import check_log, crash_log
 from cbrrt_ompl.benchmark.database import open_database, write_database
@@ -60,12 +60,12 @@ def test_a_log_that_lacks_runs_of_its_case_is_refused() -> None:
 
 @pytest.mark.parametrize("log", ["", "OMPL version 1.7.0\n"])
 def test_a_case_that_ends_well_without_its_whole_log_is_an_error(monkeypatch: pytest.MonkeyPatch, log: str) -> None:
-    code = f"import sys; print('ran', file=sys.stderr); open(sys.argv[1], 'w').write({log!r})" if log else "pass"
-    monkeypatch.setattr(case_module, "COMMAND", (sys.executable, "-c", code))
+    code = f"import sys; print('ran', file=sys.stderr); open(sys.argv[2], 'w').write({log!r})" if log else "pass"
+    monkeypatch.setattr(job_module, "COMMAND", (sys.executable, "-c", code))
     (case,) = Campaign({"open": OPEN}, ("rrt",), 3, 1.0).cases()
-    outcome = case_module.execute(case)
-    assert outcome.log is None
-    assert outcome.error.startswith("no complete log: ")
+    outcome = job_module.execute(case)
+    assert outcome.result is None
+    assert outcome.error.startswith("no complete result: ")
     assert outcome.error.endswith("\nran\n" if log else "\n")
 
 

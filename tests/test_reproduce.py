@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import re
 from collections.abc import Sequence
 from dataclasses import replace
@@ -15,22 +14,23 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cbrrt_ompl.benchmark.local import run_locally
 from cbrrt_ompl.benchmark.statistics import Interval
 from cbrrt_ompl.cli import main
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import CbrrtError, SettingsError, WorldError
+from cbrrt_ompl.files import locked
 from cbrrt_ompl.planning import plan
 from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc
 from cbrrt_ompl.problem.settings import Goal, State
 from cbrrt_ompl.reproduce import reproduction
 from cbrrt_ompl.reproduce.claims import make_claims
 from cbrrt_ompl.reproduce.grids import CENTRES, WHOLE_CELLS, GridStudy, shortest_path
-from cbrrt_ompl.reproduce.measuring import Run, measure, plan_naively, uses_of_limits
+from cbrrt_ompl.reproduce.measuring import Run, measure, plan_naively, runs_of, uses_of_limits
 from cbrrt_ompl.reproduce.outcomes import FEWEST, Outcomes, Sample
-from cbrrt_ompl.reproduce.processes import run_parts
 from cbrrt_ompl.reproduce.reproduction import reproduce
 from cbrrt_ompl.reproduce.scenes import CASE_1, CASE_2, READINGS, ROOMS, with_gaps_moved
-from cbrrt_ompl.reproduce.store import Store, locked
+from cbrrt_ompl.reproduce.store import Store
 from cbrrt_ompl.reproduce.study import NAIVE, Key, Part, Series, make_study, parts_of, study_size
 from cbrrt_ompl.reproduce.verdicts import Answer, Claim, Verdict, above, all_of, below, inside, judge, none_of
 from cbrrt_ompl.scenario.scenario import Scenario, load_scenario
@@ -300,22 +300,15 @@ def test_the_naive_rrt_weighs_all_components(gap: Scenario) -> None:
     assert naive.make_tree().states.tolist() != plane.tree.states.tolist()
 
 
-class Bomb:
-    """Ends the process that unpickles it."""
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return os._exit, (3,)
-
-
-def test_a_part_that_fails_or_crashes_costs_itself_alone() -> None:
+def test_a_part_that_fails_costs_itself_alone() -> None:
     series = small_series(runs=2)
     (good,) = parts_of(series, series.seeds)
     bad = Part(Key("bad", "", CB), {"name": "no scenario"}, (1,))
-    crashing = Part(Key("crash", "", CB), Bomb(), (1,))  # type: ignore[arg-type]
-    outcomes = {part.key.scene: outcome for part, outcome in run_parts([crashing, bad, good], jobs=2)}
-    assert [run.seed for run in outcomes[CASE_1].runs] == list(series.seeds)
-    assert outcomes["bad"].error.startswith("ScenarioError") and not outcomes["bad"].runs
-    assert outcomes["crash"].error == "its process crashed"
+    outcomes = {part.key.scene: outcome for part, outcome in run_locally([bad, good], jobs=2)}
+    assert outcomes[CASE_1].result is not None
+    assert [run.seed for run in runs_of(outcomes[CASE_1].result)] == list(series.seeds)
+    assert outcomes["bad"].result is None
+    assert outcomes["bad"].error.startswith("failed: exit code 1: scenario: bounds: missing")
 
 
 def test_a_store_survives_a_line_that_was_cut_off(tmp_path: Path) -> None:
@@ -331,7 +324,7 @@ def test_a_store_survives_a_line_that_was_cut_off(tmp_path: Path) -> None:
 
 
 def test_two_reports_do_not_share_a_folder(tmp_path: Path) -> None:
-    with locked(tmp_path), pytest.raises(CbrrtError, match="another process"), locked(tmp_path):
+    with locked(tmp_path, "taken"), pytest.raises(CbrrtError, match="taken"), locked(tmp_path, "taken"):
         pass
 
 

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import fcntl
 import re
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from cbrrt_ompl.benchmark.case import Case, Outcome, check_log, crash_log
+from cbrrt_ompl.benchmark.case import Case, check_log, crash_log
 from cbrrt_ompl.benchmark.database import check_replaceable, write_database
+from cbrrt_ompl.benchmark.job import Runner
 from cbrrt_ompl.benchmark.local import run_locally
 from cbrrt_ompl.benchmark.log import Log, format_log, merge_logs, read_log
-from cbrrt_ompl.errors import CbrrtError, InputError, Problem, SettingsError
-from cbrrt_ompl.files import write_file
+from cbrrt_ompl.errors import InputError, Problem, SettingsError
+from cbrrt_ompl.files import locked, write_file
 from cbrrt_ompl.motion.laws import law_origin
 from cbrrt_ompl.motion.model import check_step
 from cbrrt_ompl.ompl_plugin.availability import check_ompl
@@ -27,9 +27,6 @@ from cbrrt_ompl.scenario.scenario import Scenario, load_scenario, scenario_to_di
 
 RUNS_PER_CASE = 10
 """Runs that share a process: what a crash costs, and what the start of a process is spread over."""
-
-Runner: TypeAlias = Callable[[Sequence[Case]], Iterator[tuple[Case, Outcome]]]
-"""Runs cases somewhere and gives each with its outcome when it is done; closing the iterator stops all."""
 
 Progress: TypeAlias = Callable[[int], None]
 """Takes the runs done so far, those of former calls included."""
@@ -139,7 +136,7 @@ def run_campaign(
     campaign: Campaign,
     database: Path,
     log_dir: Path,
-    runner: Runner = run_locally,
+    runner: Runner[Case] = run_locally,
     progress: Progress = lambda _: None,
 ) -> Summary:
     """Run what has not been run yet, then merge the logs and make the database.
@@ -164,7 +161,7 @@ def run_campaign(
     check_replaceable(database)
     case_dir = log_dir / "cases"
     case_dir.mkdir(parents=True, exist_ok=True)
-    with _locked(log_dir):
+    with locked(log_dir, "another campaign is using this folder"):
         cases = campaign.cases()
         finished = {case.name: log for case in cases if (log := _finished_log(case_dir, case)) is not None}
         kept = done = sum(len(case.seeds) for case in cases if case.name in finished)
@@ -174,11 +171,11 @@ def run_campaign(
         order = np.random.default_rng(campaign.seed).permutation(len(waiting))  # the time so far tells of that to come
         with closing(runner([waiting[i] for i in order])) as outcomes:  # type: ignore[type-var]
             for case, outcome in outcomes:
-                if outcome.log is None:
+                if outcome.result is None:
                     crashes[case.name] = outcome.error.partition("\n")[0]
                     write_file(case_dir / f"{case.name}.error", outcome.error)
                 else:
-                    write_file(case_dir / f"{case.name}.log", outcome.log)
+                    write_file(case_dir / f"{case.name}.log", outcome.result)
                     (case_dir / f"{case.name}.error").unlink(missing_ok=True)
                     finished[case.name] = read_log(case_dir / f"{case.name}.log")
                 done += len(case.seeds)
@@ -208,14 +205,3 @@ def _finished_log(case_dir: Path, case: Case) -> Log | None:
     except (FileNotFoundError, InputError):
         return None
     return log
-
-
-@contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Keep other campaigns out of a folder."""
-    with open(folder / ".lock", "w") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise CbrrtError(f"{folder}: another campaign is using this folder") from None
-        yield

@@ -2,38 +2,23 @@
 
 from __future__ import annotations
 
-import ctypes
 import hashlib
 import json
-import os
 import platform
-import signal
-import subprocess
-import sys
-import tempfile
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from functools import cached_property
-from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
+from cbrrt_ompl.benchmark.job import START_ALLOWANCE, do_job
 from cbrrt_ompl.benchmark.log import Log, PlannerLog, format_log, parse_log
 from cbrrt_ompl.errors import InputError, Problem
-
-COMMAND = (sys.executable, "-m", "cbrrt_ompl.benchmark.case")
-"""Runs the case on its standard input; takes the name of the log file and the number of the process that waits."""
-
-START_ALLOWANCE = 180.0
-"""Time that a process may take to start and to compile before it counts as hung [s]."""
 
 STATUSES = (
     "Unknown status", "Invalid start", "Invalid goal", "Unrecognized goal type", "Timeout", "Approximate solution",
     "Exact solution", "Crash", "Unknown status", "Unknown status",
 )  # fmt: skip
 """The values of OMPL's status as its Benchmark writes them."""
-
-_PR_SET_PDEATHSIG = 1
 
 
 @dataclass(frozen=True)
@@ -57,6 +42,8 @@ class Case:
     law: dict[str, str] | None = None
     """Where to import the scenario's control law from, if it does not come with the package."""
 
+    module: ClassVar[str] = "cbrrt_ompl.benchmark.case"
+
     @cached_property
     def name(self) -> str:
         """Name that differs where anything differs that matters for the results."""
@@ -68,54 +55,13 @@ class Case:
         """Time after which the case counts as hung [s]."""
         return START_ALLOWANCE + len(self.seeds) * (2.0 * self.time_limit + 5.0)
 
+    def check(self, result: str) -> None:
+        """Refuse what is not OMPL's log of all runs.
 
-@dataclass(frozen=True)
-class Outcome:
-    """What came of a case: a log, or the reason why there is none."""
-
-    log: str | None = None
-    """OMPL's log."""
-    error: str = ""
-    """Why there is no log: one line, then what the process wrote."""
-
-
-def execute(case: Case, patience: float | None = None, started: Callable[[Any], None] = lambda _: None) -> Outcome:
-    """Run a case in a process of its own and wait for it.
-
-    Args:
-        case: what to run.
-        patience: time after which it counts as hung and is killed [s]; the case's own if None.
-        started: takes the process when it runs.
-    """
-    patience = case.patience if patience is None else patience
-    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-    with tempfile.TemporaryDirectory(prefix="cbrrt_bench_") as folder:
-        path = Path(folder, "benchmark.log")
-        with subprocess.Popen(
-            [*COMMAND, str(path), str(os.getpid())],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-            errors="replace",
-            env={**os.environ, **threads},
-            start_new_session=True,
-        ) as process:
-            started(process)
-            try:
-                _, said = process.communicate(json.dumps(asdict(case)), timeout=patience)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                _, said = process.communicate()
-                return Outcome(error=f"hung: killed after {patience:g} s\n{said}")
-        if process.returncode != 0:
-            return Outcome(error=f"{_cause(process.returncode)}\n{said}")
-        try:
-            log = path.read_text(encoding="utf-8")
-            check_log(parse_log(log, case.name), case)
-        except (OSError, InputError) as error:
-            return Outcome(error=f"no complete log: {error}\n{said}")
-        return Outcome(log)
+        Raises:
+            InputError: with what is missing.
+        """
+        check_log(parse_log(result, self.name), self)
 
 
 def check_log(log: Log, case: Case) -> None:
@@ -149,39 +95,22 @@ def crash_log(case: Case, settings: tuple[str, ...] = ()) -> Log:
     )
 
 
-def main() -> None:
-    """Run the case on the standard input."""
-    die_with_parent(int(sys.argv[2]))
-    case = Case(**json.load(sys.stdin))
+def do_case(values: dict[str, Any]) -> str:
+    """OMPL's log of a case that is run in this process.
+
+    Args:
+        values: the fields of the case.
+    """
     from cbrrt_ompl.benchmark.experiment import Experiment
     from cbrrt_ompl.motion.laws import register_origin
     from cbrrt_ompl.scenario.scenario import scenario_from_dict
 
+    case = Case(**values)
     if case.law is not None:
         register_origin(case.law)
     scenario = scenario_from_dict(case.scenario)
-    log = Experiment(scenario, {case.planner: case.seeds}, case.experiment).run(case.time_limit)
-    Path(sys.argv[1]).write_text(format_log(log), encoding="utf-8")
-
-
-def die_with_parent(parent: int) -> None:
-    """Have the kernel kill this process as soon as the one that waits for it has ended, whatever ended it.
-
-    Args:
-        parent: number of the process that waits.
-    """
-    if sys.platform == "linux":
-        ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-        if os.getppid() != parent:
-            os.kill(os.getpid(), signal.SIGKILL)
-
-
-def _cause(returncode: int) -> str:
-    """Why a process ended."""
-    if returncode < 0:
-        return f"crashed: {signal.Signals(-returncode).name}"
-    return f"failed: exit code {returncode}"
+    return format_log(Experiment(scenario, {case.planner: case.seeds}, case.experiment).run(case.time_limit))
 
 
 if __name__ == "__main__":
-    main()
+    do_job(do_case)

@@ -1,4 +1,4 @@
-"""Cases on a cluster of dask.distributed: past one machine, or on workers of this one."""
+"""Jobs on a cluster of dask.distributed: past one machine, or on workers of this one."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from importlib import import_module
 from typing import Any
 
-from cbrrt_ompl.benchmark.case import Case, Outcome, execute
+from cbrrt_ompl.benchmark.job import J, Outcome, execute
 from cbrrt_ompl.errors import CbrrtError
 
 CONNECT_TIMEOUT = 15.0
@@ -17,18 +17,18 @@ LOCAL = "local"
 """Address that stands for a cluster on this machine, made for the campaign."""
 
 
-def run_on_cluster(cases: Sequence[Case], address: str, jobs: int = 1) -> Iterator[tuple[Case, Outcome]]:
-    """Run cases on the workers of a cluster, each in a process of its own there.
+def run_on_cluster(waiting: Sequence[J], address: str, jobs: int = 1) -> Iterator[tuple[J, Outcome]]:
+    """Run jobs on the workers of a cluster, each in a process of its own there.
 
-    A case whose worker dies is run again by another one; one that has outlived several workers counts as crashed.
+    A job whose worker dies is run again by another one; one that has outlived several workers counts as crashed.
 
     Args:
-        cases: what to run.
+        waiting: what to run.
         address: of the scheduler, such as ``tcp://host:8786``, or `LOCAL`.
         jobs: workers of a local cluster.
 
     Yields:
-        Each case with its outcome when it is done. Closing the iterator gives the others up.
+        Each job with its outcome when it is done. Closing the iterator gives the others up.
 
     Raises:
         CbrrtError: if there is no dask.distributed, or no scheduler at that address.
@@ -36,7 +36,7 @@ def run_on_cluster(cases: Sequence[Case], address: str, jobs: int = 1) -> Iterat
     distributed = _import_distributed()
     with ExitStack() as stack:
         client = _connect(distributed, stack, address, jobs)
-        futures = {client.submit(execute, case, key=case.name, pure=False): case for case in cases}
+        futures = {client.submit(execute, job, key=job.name, pure=False): job for job in waiting}
         for future in distributed.as_completed(list(futures), raise_errors=False):
             yield futures.pop(future), _outcome(future)
             future.release()
@@ -63,7 +63,7 @@ def _connect(distributed: Any, stack: ExitStack, address: str, jobs: int) -> Any
 
 
 def _outcome(future: Any) -> Outcome:
-    """What came of a case; an error where the cluster gave it up."""
+    """What came of a job; an error where the cluster gave it up."""
     if future.status == "finished":
         outcome: Outcome = future.result()
         return outcome

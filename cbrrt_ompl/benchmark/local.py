@@ -1,4 +1,4 @@
-"""Cases on this machine: several processes at a time."""
+"""Jobs on this machine: several processes at a time."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from typing import Any
 
-from cbrrt_ompl.benchmark.case import Case, Outcome, execute
+from cbrrt_ompl.benchmark.job import J, Outcome, execute
 
 
 def available_cores() -> int:
@@ -17,21 +17,21 @@ def available_cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def run_locally(cases: Sequence[Case], jobs: int = 1, patience: float | None = None) -> Iterator[tuple[Case, Outcome]]:
-    """Run cases, each in a process of its own.
+def run_locally(waiting: Sequence[J], jobs: int = 1, patience: float | None = None) -> Iterator[tuple[J, Outcome]]:
+    """Run jobs, each in a process of its own.
 
     Args:
-        cases: what to run.
+        waiting: what to run; the first ones begin first.
         jobs: how many at a time.
-        patience: time after which a case counts as hung [s]; its own if None.
+        patience: time after which a job counts as hung [s]; its own if None.
 
     Yields:
-        Each case with its outcome when it is done. Closing the iterator kills what is running.
+        Each job with its outcome when it is done. Closing the iterator kills what is running.
     """
     processes = _Processes()
     pool = ThreadPoolExecutor(jobs)
     try:
-        futures = {pool.submit(execute, case, patience, processes.add): case for case in cases}
+        futures = {pool.submit(execute, job, patience, processes.add): job for job in waiting}
         for future in as_completed(futures):
             yield futures.pop(future), future.result()
     finally:

@@ -7,34 +7,18 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, NamedTuple
+from typing import Any
 
 from cbrrt_ompl.ompl_plugin.binding import ob, ou
 from cbrrt_ompl.ompl_plugin.compiled_methods import use_compiled_methods
 from cbrrt_ompl.ompl_plugin.paper_planner import PaperPlanner
 from cbrrt_ompl.ompl_plugin.results import trajectory_from_path, tree_from_planner
 from cbrrt_ompl.ompl_plugin.setup import Equipment, make_equipped_setup
+from cbrrt_ompl.planners.first_plan import FirstPlan
 from cbrrt_ompl.scenario.scenario import Scenario
-from cbrrt_ompl.trajectory.trajectory import Trajectory
-from cbrrt_ompl.trajectory.tree import Tree
 
 _ompl = threading.RLock()
 """Held by the plan that OMPL is busy with: its seed and its log level are those of the process."""
-
-
-class Found(NamedTuple):
-    """What OMPL's planner came back with."""
-
-    trajectory: Trajectory | None
-    """Into the goal region; None where it was not reached."""
-    count_nodes: Callable[[], int]
-    """Counts the nodes of the tree; OMPL copies it for that, so that it takes its time."""
-    samples: int
-    """Samples drawn, or rounds of the main loop of OMPL's own planners."""
-    planning_time: float
-    """Time of ``solve`` [s]."""
-    make_tree: Callable[[], Tree]
-    """Makes the tree out of the planner's memory."""
 
 
 def run(
@@ -45,7 +29,7 @@ def run(
     should_stop: Callable[[int], bool],
     on_equipped: Callable[[Equipment], None] = lambda _: None,
     prepare: Callable[[Any], None] = lambda _: None,
-) -> Found:
+) -> FirstPlan:
     """Set a planner up and let it solve the scenario; other threads wait, and their clocks with them.
 
     Args:
@@ -78,7 +62,7 @@ def run(
         trajectory = None
         if setup.haveExactSolutionPath():
             trajectory = trajectory_from_path(setup.getSolutionPath(), scenario)
-    return Found(
+    return FirstPlan(
         trajectory,
         count_nodes=lambda: count_nodes(setup.getPlanner(), si),
         samples=solver.samples if isinstance(solver, PaperPlanner) else rounds.count,

@@ -12,6 +12,7 @@ from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.motion.laws import raise_errors
 from cbrrt_ompl.motion.model import make_model
 from cbrrt_ompl.motion.records import Records, record_array
+from cbrrt_ompl.planners.first_plan import FirstPlan
 from cbrrt_ompl.planners.growth import (
     DRAWS,
     GROW_REACHED,
@@ -196,6 +197,11 @@ class Search:
     def tree(self) -> Tree:
         """All nodes, with the way along every edge."""
         return tree_from_controls(*self.edges(), self.model)
+
+    def first_plan(self, planning_time: float) -> FirstPlan:
+        """What came of the search so far, in some time [s]."""
+        trajectory = self.trajectory() if self.has_reached_goal else None
+        return FirstPlan(trajectory, lambda: self.nodes, self.samples, planning_time, self.tree)
 
 
 def search_in(

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
+from cbrrt_ompl.benchmark.job import do_job
+from cbrrt_ompl.planners.first_plan import FirstPlan
 from cbrrt_ompl.planning import plan
 from cbrrt_ompl.problem.robot import Limits
-from cbrrt_ompl.reproduce.study import NAIVE, Part
+from cbrrt_ompl.reproduce.study import NAIVE, TIME_LIMIT, Key, Part
 from cbrrt_ompl.scenario.scenario import Scenario, scenario_from_dict
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.verification import verify
-
-if TYPE_CHECKING:
-    from cbrrt_ompl.ompl_plugin.run import Found
-
-TIME_LIMIT = 300.0
-"""Planning time that a run may take [s]; the paper's limit is the number of samples."""
 
 WARM_UP = 0.01
 """Planning time of a run before the measured ones [s]."""
@@ -65,6 +62,17 @@ def measure(part: Part) -> list[Run]:
     return [_measure_one(scenario, planner, seed) for seed in part.seeds]
 
 
+def runs_of(result: str) -> list[Run]:
+    """The runs that the process of a part has written, a line each."""
+    return [Run(**json.loads(line)) for line in result.splitlines()]
+
+
+def _do_part(values: dict[str, Any]) -> str:
+    """The runs of a part, a line each, from its fields."""
+    part = Part(Key(*values["key"]), values["scenario"], tuple(values["seeds"]))
+    return "".join(f"{json.dumps(asdict(run))}\n" for run in measure(part))
+
+
 def _measure_one(scenario: Scenario, planner: str, seed: int) -> Run:
     """One run and its verification."""
     if planner == NAIVE:
@@ -89,7 +97,7 @@ def _measure_one(scenario: Scenario, planner: str, seed: int) -> Run:
     )
 
 
-def plan_naively(scenario: Scenario, seed: int) -> Found:
+def plan_naively(scenario: Scenario, seed: int) -> FirstPlan:
     """OMPL's control::RRT as it comes, with a metric over all five components of the state.
 
     Each component has weight 1, so that samples are drawn from, and the nearest node is sought in, the whole state
@@ -128,3 +136,7 @@ def uses_of_limits(trajectory: Trajectory, limits: Limits) -> tuple[float, float
         changes = np.abs(np.diff(values)) / np.diff(trajectory.t)
         accelerations.append(float(changes.max(initial=0.0)) / most)
     return max(speeds), max(accelerations)
+
+
+if __name__ == "__main__":
+    do_job(_do_part)

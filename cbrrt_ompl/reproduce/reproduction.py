@@ -6,22 +6,24 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 
-from cbrrt_ompl.benchmark.local import available_cores
+from cbrrt_ompl.benchmark.job import Runner
+from cbrrt_ompl.benchmark.local import available_cores, run_locally
 from cbrrt_ompl.errors import Problem, SettingsError
-from cbrrt_ompl.files import write_file, write_files
+from cbrrt_ompl.files import locked, write_file, write_files
 from cbrrt_ompl.ompl_plugin.availability import check_ompl
 from cbrrt_ompl.planners.nearest import KINDS
 from cbrrt_ompl.reproduce.grids import CELLS, PLACES, RULES, GridStudy, study_grids
 from cbrrt_ompl.reproduce.machine import machine, versions
+from cbrrt_ompl.reproduce.measuring import runs_of
 from cbrrt_ompl.reproduce.neighbours import query_costs
 from cbrrt_ompl.reproduce.outcomes import Outcomes
-from cbrrt_ompl.reproduce.processes import run_parts
 from cbrrt_ompl.reproduce.published import TREE_SIZES
 from cbrrt_ompl.reproduce.report import Material, make_report
 from cbrrt_ompl.reproduce.scenes import CASE_1, CASE_2
-from cbrrt_ompl.reproduce.store import Store, locked
+from cbrrt_ompl.reproduce.store import Store
 from cbrrt_ompl.reproduce.study import Part, Series, make_study, parts_of
 from cbrrt_ompl.reproduce.verdicts import Claim
 from cbrrt_ompl.scenario.scenario import Scenario
@@ -94,9 +96,9 @@ def reproduce(
     jobs = jobs or available_cores()
     (output / PICTURES).mkdir(parents=True, exist_ok=True)
     study = make_study(runs, brief)
-    with locked(output):
+    with locked(output, "another process is making a report there"):
         store = Store(output / RUNS_FILE)
-        kept, failures = _run(study, store, jobs, progress)
+        kept, failures = _run(study, store, partial(run_locally, jobs=jobs), progress)
         digests = {series.key: series.digest(_place()) for series in study}
         outcomes = Outcomes(
             {
@@ -126,7 +128,7 @@ def reproduce(
 
 
 def _run(
-    study: Sequence[Series], store: Store, jobs: int, progress: Callable[[int], None]
+    study: Sequence[Series], store: Store, runner: Runner[Part], progress: Callable[[int], None]
 ) -> tuple[int, dict[str, str]]:
     """Run what is missing; the number of runs that were there, and what went wrong by the name of the series."""
     digests = {series.key: series.digest(_place()) for series in study}
@@ -137,12 +139,12 @@ def _run(
     kept = done = sum(series.runs for series in study) - sum(len(part.seeds) for part in parts)
     failures: dict[str, str] = {}
     progress(done)
-    with closing(run_parts(parts, jobs)) as outcomes:  # type: ignore[type-var]
+    with closing(runner(parts)) as outcomes:  # type: ignore[type-var]
         for part, outcome in outcomes:
-            if outcome.error:
-                failures[" ".join(filter(None, part.key))] = outcome.error
+            if outcome.result is None:
+                failures[" ".join(filter(None, part.key))] = outcome.error.partition("\n")[0]
             else:
-                store.add(digests[part.key], part.key, outcome.runs)
+                store.add(digests[part.key], part.key, runs_of(outcome.result))
             done += len(part.seeds)
             progress(done)
     return kept, failures

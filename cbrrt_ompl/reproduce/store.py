@@ -1,17 +1,14 @@
-"""Finished runs in a file, a line each, so that an interrupted study goes on where it stopped."""
+"""Runs as lines of text, and finished ones in a file of them, so that an interrupted study goes on where it stopped."""
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from cbrrt_ompl.errors import CbrrtError
 from cbrrt_ompl.reproduce.measuring import Run
 from cbrrt_ompl.reproduce.study import Key
 
@@ -54,21 +51,6 @@ class Store:
             file.flush()
             os.fsync(file.fileno())
         self._runs.setdefault(digest, {}).update({run.seed: run for run in runs})
-
-
-@contextmanager
-def locked(folder: Path) -> Iterator[None]:
-    """Keep other studies out of a folder.
-
-    Raises:
-        CbrrtError: if another one is using it.
-    """
-    with open(folder / ".lock", "w") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise CbrrtError(f"{folder}: another process is making a report there") from None
-        yield
 
 
 def _parsed(line: bytes) -> tuple[str, Run] | None:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from cbrrt_ompl.benchmark.campaign import run_seeds
+from cbrrt_ompl.benchmark.job import START_ALLOWANCE
+from cbrrt_ompl.errors import InputError, Problem
 from cbrrt_ompl.reproduce.scenes import (
     BRIEF_SHIFTS,
     CASE_1,
@@ -36,8 +38,12 @@ NEIGHBOURS = ("kd-tree", "brute-force")
 SEED = 1
 """Seed from which those of all runs are made."""
 
-RUNS_PER_PART = 25
-SLOW_RUNS_PER_PART = 1
+RUNS_PER_PART = 100
+SLOW_RUNS_PER_PART = 5
+"""Runs that share a process."""
+
+TIME_LIMIT = 300.0
+"""Planning time that a run may take [s]; the paper's limit is the number of samples."""
 
 SLOW_SHARE = 4
 """One run in so many is made where a run takes seconds ..."""
@@ -98,6 +104,27 @@ class Part:
     """The scenario as plain values."""
     seeds: tuple[int, ...]
     """Seed of each run."""
+
+    module: ClassVar[str] = "cbrrt_ompl.reproduce.measuring"
+
+    @cached_property
+    def name(self) -> str:
+        """Different for different parts."""
+        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()[:16]
+
+    @property
+    def patience(self) -> float:
+        """Time after which the part counts as hung [s]."""
+        return START_ALLOWANCE + 2.0 * TIME_LIMIT * len(self.seeds)
+
+    def check(self, result: str) -> None:
+        """Refuse what is not a line a run.
+
+        Raises:
+            InputError: with how many there are.
+        """
+        if len(result.splitlines()) != len(self.seeds):
+            raise InputError(Problem("runs", len(result.splitlines()), str(len(self.seeds))))
 
 
 def make_study(runs: int, brief: bool = False) -> list[Series]:
