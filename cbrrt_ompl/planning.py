@@ -14,12 +14,14 @@ import numpy as np
 
 from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.collision.free_poses import nearest_free_pose
+from cbrrt_ompl.compiled_beside import compiled_beside
 from cbrrt_ompl.errors import Problem, SettingsError
 from cbrrt_ompl.motion.model import ROOM, check_step, jumps, make_model
 from cbrrt_ompl.ompl_plugin.availability import check_ompl, has_ompl
 from cbrrt_ompl.optimise.anytime import further_guesses, robust_search
 from cbrrt_ompl.optimise.improving import Found, Improver, check_improvement, geodesic_guesses
 from cbrrt_ompl.optimise.improving import warm_up as warm_up_improvement
+from cbrrt_ompl.optimise.interior_point import iterate
 from cbrrt_ompl.optimise.objective import Objective
 from cbrrt_ompl.planners.first_plan import FirstPlan
 from cbrrt_ompl.planners.registry import PLANNERS, is_compiled, law_of, planner_named, scenario_for
@@ -246,13 +248,16 @@ def warm_up_planner(planner: str) -> None:
     """
     if not is_compiled(planner):
         check_ompl(f"planner {planner!r}", "s-rrt-compiled" if planner == "s-rrt" else "cb-rrt-compiled")
-    warm_up()
+    if planner_named(planner).is_anytime:
+        with compiled_beside("cbrrt_ompl.optimise.improving", "warm_up", iterate):
+            warm_up()
+        warm_up_improvement()
+    else:
+        warm_up()
     if not is_compiled(planner):
         from cbrrt_ompl.ompl_plugin import warm_up as plugin  # here, so that the compiled planners need no OMPL
 
         plugin.warm_up()
-    if planner_named(planner).is_anytime:
-        warm_up_improvement()
 
 
 def _check_arguments(seed: object, time_limit: object, progress: object) -> None:

@@ -107,8 +107,8 @@ FAKE_CASE = """
 import json, os, sys, time
 from dataclasses import replace
 from cbrrt_ompl.benchmark.case import Case, crash_log
-from cbrrt_ompl.benchmark.job import die_with_parent
 from cbrrt_ompl.benchmark.log import format_log
+from cbrrt_ompl.processes import die_with_parent
 die_with_parent(int(sys.argv[3]))
 data = json.load(sys.stdin)
 case = Case(**{**data, "seeds": tuple(data["seeds"])})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import json
 import os
 import signal
@@ -15,14 +14,13 @@ from pathlib import Path
 from typing import Any, ClassVar, Protocol, TypeAlias, TypeVar
 
 from cbrrt_ompl.errors import InputError
+from cbrrt_ompl.processes import die_with_parent
 
 COMMAND = (sys.executable, "-m")
 """Runs the module of a job; takes its name, the file for the result and the number of the process that waits."""
 
 START_ALLOWANCE = 180.0
 """Time that a process may take to start and to compile before it counts as hung [s]."""
-
-_PR_SET_PDEATHSIG = 1
 
 
 class Job(Protocol):
@@ -124,18 +122,6 @@ def do_job(do: Callable[[dict[str, Any]], str]) -> None:
     path, parent = sys.argv[1:]
     die_with_parent(int(parent))
     Path(path).write_text(do(json.load(sys.stdin)), encoding="utf-8")
-
-
-def die_with_parent(parent: int) -> None:
-    """Have the kernel kill this process as soon as the one that waits for it has ended, whatever ended it.
-
-    Args:
-        parent: number of the process that waits.
-    """
-    if sys.platform == "linux":
-        ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-        if os.getppid() != parent:
-            os.kill(os.getpid(), signal.SIGKILL)
 
 
 def _cause(returncode: int, said: str) -> str:

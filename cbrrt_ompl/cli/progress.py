@@ -5,9 +5,16 @@ from __future__ import annotations
 import sys
 import threading
 import time
+import timeit
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any
+
+LOOPS_OF_PLANNERS, LOOPS_OF_PLUGIN, LOOPS_OF_IMPROVEMENT = 7_000, 2_500, 5_000
+"""Time to compile the compiled planners, what OMPL calls besides, and the improvement, in times of a loop in Python."""
+
+SHARE_OF_TWO_CORES = 0.6
+"""How much of that time it takes where a second core compiles as well."""
 
 SILENCE = 30.0
 """Time after which a campaign that nobody watches tells how far it is, once [s]."""
@@ -25,8 +32,7 @@ def warm_up(planner: str | None, improves: bool = False) -> None:
     """
     from cbrrt_ompl import planning
 
-    message = "cbrrt: compiling the planners, once after installation ..."
-    timer = threading.Timer(1.0, print, [message], {"file": sys.stderr, "flush": True})
+    timer = threading.Timer(1.0, _tell_of_compilation, [planner, improves])
     timer.daemon = True
     if sys.stderr.isatty():
         timer.start()
@@ -37,6 +43,22 @@ def warm_up(planner: str | None, improves: bool = False) -> None:
             planning.warm_up_improvement()
     finally:
         timer.cancel()
+
+
+def _tell_of_compilation(planner: str | None, improves: bool) -> None:
+    """Say what is going on and, from the speed of this machine, about how long."""
+    from cbrrt_ompl.benchmark.local import available_cores
+    from cbrrt_ompl.planners.registry import PLANNERS, is_compiled
+
+    loops = 0 if planner is None else LOOPS_OF_PLANNERS
+    if planner is not None and not is_compiled(planner):
+        loops += LOOPS_OF_PLUGIN
+    if improves or (planner is not None and PLANNERS[planner].is_anytime):
+        loops += LOOPS_OF_IMPROVEMENT
+    share = SHARE_OF_TWO_CORES if available_cores() > 1 else 1.0
+    seconds = share * loops * min(timeit.repeat("sum(i * i for i in range(100_000))", number=1, repeat=3))
+    about = f"about {max(5.0, 5.0 * round(seconds / 5.0)):.0f} s"
+    print(f"cbrrt: compiling the planners, once after installation: {about} ...", file=sys.stderr, flush=True)
 
 
 @contextmanager

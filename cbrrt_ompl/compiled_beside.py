@@ -1,0 +1,82 @@
+"""Compile kernels in a second process: numba uses one core, and both find what the other has done on the disk."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+_IS_BESIDE = "CBRRT_OMPL_COMPILES_BESIDE"
+"""In the environment of the second process: it starts no third one."""
+
+_running: list[subprocess.Popen[bytes]] = []
+"""Processes that compile beside this one: no more than there are other cores."""
+
+_CODE = """
+import sys
+sys.path[:] = {path!r}
+from cbrrt_ompl.processes import die_with_parent
+die_with_parent({parent})
+from {module} import {function}
+{function}()
+"""
+
+
+@contextmanager
+def compiled_beside(module: str, function: str, kernel: Any) -> Iterator[None]:
+    """Have a second process compile while the block runs, if there is anything to compile; then wait for it.
+
+    Nothing depends on it but the time: what it leaves undone is compiled where it is called. There is none on a single
+    core, where numba keeps no kernels on the disk, or where Python is a part of another program.
+
+    Args:
+        module: name of a module of this package.
+        function: name of a function in it that makes kernels ready.
+        kernel: one of them; where it has been compiled before, all have.
+    """
+    is_python = Path(sys.executable or "").name.startswith("python")
+    if os.environ.get(_IS_BESIDE) or not is_python or len(_running) + 1 >= _cores() or not _is_missing(kernel):
+        yield
+        return
+    try:
+        process = _start(module, function)
+    except OSError:  # the limit of processes
+        yield
+        return
+    _running.append(process)
+    try:
+        yield
+        process.wait()
+    finally:
+        process.kill()
+        process.wait()
+        _running.remove(process)
+
+
+def _start(module: str, function: str) -> subprocess.Popen[bytes]:
+    """Start the second process."""
+    code = _CODE.format(path=sys.path, parent=os.getpid(), module=module, function=function)
+    return subprocess.Popen(
+        [sys.executable, "-c", code],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, _IS_BESIDE: "1"},
+        start_new_session=True,  # Ctrl-C is for the first process
+    )
+
+
+def _cores() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _is_missing(kernel: Any) -> bool:
+    """Whether numba keeps kernels on the disk, and has not kept this one yet."""
+    cache = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
+    index = getattr(cache, "_index_path", None)
+    return index is not None and not kernel.signatures and not Path(index).exists()
