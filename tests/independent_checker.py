@@ -21,6 +21,9 @@ START_TOLERANCE = 1e-6
 MOTION_TOLERANCE = 1e-3
 """Largest deviation of a row from the motion that its commands lead to, in each value."""
 
+ROUNDING = 1e-9
+"""Velocities up to this count as rest [m/s, rad/s]."""
+
 SHORTEST_WAY = 1e-4
 """Way of the robot between two free poses that is not looked at more closely [m]."""
 
@@ -108,16 +111,26 @@ def _wheels(limits: Mapping[str, Any], v: Any, omega: Any) -> tuple[Any, Any]:
 def _accelerations(limits: Mapping[str, Any], rows: Mapping[str, NDArray[np.float64]]) -> Iterator[str]:
     left, right = _wheels(limits, rows["v"], rows["omega"])
     wheel_acceleration = limits.get("wheel_acceleration", math.inf)
-    for name, values, limit in (
-        ("v", rows["v"], limits["acceleration"]),
-        ("omega", rows["omega"], limits["angular_acceleration"]),
-        ("left wheel", left, wheel_acceleration),
-        ("right wheel", right, wheel_acceleration),
+    for name, values, (faster, slower) in (
+        ("v", rows["v"], _rates(limits, "")),
+        ("omega", rows["omega"], _rates(limits, "angular_")),
+        ("left wheel", left, (wheel_acceleration, wheel_acceleration)),
+        ("right wheel", right, (wheel_acceleration, wheel_acceleration)),
     ):
-        changes = np.abs(np.diff(values))
-        too_fast = ~(changes <= limit * np.diff(rows["t"]) * (1.0 + 1e-9) + 1e-12)
+        changes, durations = np.abs(np.diff(values)), np.diff(rows["t"]) * (1.0 + 1e-9)
+        speeds = np.abs(values)
+        turns_round = (values[1:] * values[:-1] < 0.0) & (np.minimum(speeds[1:], speeds[:-1]) > ROUNDING)
+        grows, shrinks = (speeds[1:] > speeds[:-1]) | turns_round, (speeds[1:] < speeds[:-1]) | turns_round
+        too_fast = grows & ~(changes <= faster * durations + 1e-12)
+        too_fast |= shrinks & ~(changes <= slower * durations + 1e-12)
         if too_fast.any():
             yield f"acceleration: {name} in row {np.flatnonzero(too_fast)[0]}"
+
+
+def _rates(limits: Mapping[str, Any], prefix: str) -> tuple[float, float]:
+    """Acceleration and deceleration, which may be left out."""
+    acceleration = limits[f"{prefix}acceleration"]
+    return acceleration, limits.get(f"{prefix}deceleration", acceleration)
 
 
 def driven(
@@ -152,13 +165,18 @@ def _ramped(
 ) -> tuple[float, float]:
     """Velocities after a time in which they are to change by some amounts, as far as the accelerations allow."""
     shares = {"v": 1.0, "omega": 1.0}
-    for name, change, acceleration in (
-        ("v", dv, limits["acceleration"]),
-        ("omega", domega, limits["angular_acceleration"]),
+    wheels_rule = bool({"wheel_speed", "wheel_acceleration"} & set(limits))
+    for name, value, change, (faster, slower) in (
+        ("v", v, dv, _rates(limits, "")),
+        ("omega", omega, domega, _rates(limits, "angular_")),
     ):
-        if abs(change) > acceleration * duration:
-            shares[name] = acceleration * duration / abs(change)
-    if {"wheel_speed", "wheel_acceleration"} & set(limits):  # they then change together, and no wheel too fast
+        slows = value * change < 0.0 and abs(value) > ROUNDING
+        most = (slower if slows else faster) * duration
+        if slows and abs(change) > abs(value) and (wheels_rule or most > abs(value)):  # through rest
+            most = min(faster, slower) * duration if wheels_rule else max(abs(value), min(faster, slower) * duration)
+        if abs(change) > most:
+            shares[name] = most / abs(change)
+    if wheels_rule:  # they then change together, and no wheel too fast
         most = limits.get("wheel_acceleration", math.inf) * duration
         wheels = [most / abs(change) for change in _wheels(limits, dv, domega) if abs(change) > most]
         shares["v"] = shares["omega"] = min(*shares.values(), *wheels)

@@ -63,6 +63,8 @@ LIMITS: SearchStrategy[Limits] = st.builds(
     SIZES,
     SIZES | st.just(math.inf),
     SIZES | st.just(math.inf),
+    SIZES | st.just(math.inf),
+    SIZES | st.just(math.inf),
 )
 """Limits of robots of all kinds."""
 

@@ -47,7 +47,7 @@ class TestSineAndCosine:
 class TestAxisLimits:
     def test_by_hand(self) -> None:
         found = axis_limits(EITHER)
-        assert found == pytest.approx((-0.5, 0.5, -2.0, 2.5, 0.7, 2.5, 0.4, 0.5, 0.7), rel=1e-14)
+        assert found == pytest.approx((-0.5, 0.5, -2.0, 2.5, 0.7, 2.5, 0.4, 0.5, 0.7, 0.7, 2.5), rel=1e-14)
         assert axis_limits(EITHER._replace(angular_acceleration=9.0)).angular_acceleration == pytest.approx(3.5)
 
     def test_a_robot_without_wheel_limits_has_its_own(self) -> None:
@@ -71,8 +71,8 @@ class TestAxisLimits:
     @given(WHEELED)
     def test_a_pure_ramp_takes_a_second_to_its_acceleration(self, limits: Limits) -> None:
         pure = axis_limits(limits)
-        assert joint_ramp_time(pure.acceleration, 0.0, limits) == pytest.approx(1.0, rel=1e-14)
-        assert joint_ramp_time(0.0, -pure.angular_acceleration, limits) == pytest.approx(1.0, rel=1e-14)
+        assert joint_ramp_time(0.0, 0.0, pure.acceleration, 0.0, limits) == pytest.approx(1.0, rel=1e-14)
+        assert joint_ramp_time(0.0, 0.0, 0.0, -pure.angular_acceleration, limits) == pytest.approx(1.0, rel=1e-14)
 
 
 class TestStoppingTime:
@@ -100,7 +100,7 @@ class TestJointSteps:
         [((0.3, 0.0), 0.3 / 0.7), ((-0.3, 0.5), 0.4 / 0.7), ((0.0, -1.5), 0.6), ((0.05, -1.0), 0.4)],
     )
     def test_ramp_times_by_hand(self, command: tuple[float, float], time: float) -> None:
-        assert joint_ramp_time(*command, EITHER) == pytest.approx(time, rel=1e-14)
+        assert joint_ramp_time(0.0, 0.0, *command, EITHER) == pytest.approx(time, rel=1e-14)
 
     @given(WHEELED, SHARES, SHARES, st.floats(-2.0, 2.0), st.floats(-3.0, 3.0))
     def test_a_dynamic_step_of_a_robot_with_wheel_limits_ramps_both_velocities_jointly(

@@ -84,13 +84,13 @@ class TestWrapAngle:
 class TestRamp:
     @given(speeds, speeds, st.floats(1e-6, 3.0))
     def test_no_step_changes_more_than_allowed(self, current: float, command: float, most: float) -> None:
-        assert abs(ramp(current, command, most) - current) <= most + 1e-15
+        assert abs(ramp(current, command, most, most) - current) <= most + 1e-15
 
     @given(speeds, speeds, st.floats(1e-6, 3.0))
     def test_every_step_goes_towards_the_command_and_not_past_it(
         self, current: float, command: float, most: float
     ) -> None:
-        after = ramp(current, command, most)
+        after = ramp(current, command, most, most)
         assert min(current, command) <= after <= max(current, command)
         assert after != current or current == command
 
@@ -98,19 +98,19 @@ class TestRamp:
     def test_the_command_is_reached_exactly_and_in_time(self, current: float, command: float, most: float) -> None:
         value = current
         for _ in range(math.ceil(abs(command - current) / most + 1e-9)):
-            value = ramp(value, command, most)
+            value = ramp(value, command, most, most)
         assert value == pytest.approx(command, abs=1e-13)
-        assert ramp(value, command, most) == command
-        assert ramp(command, command, most) == command
+        assert ramp(value, command, most, most) == command
+        assert ramp(command, command, most, most) == command
 
     @given(speeds, speeds, st.floats(0.0, 3.0))
     def test_braking_mirrors_accelerating(self, current: float, command: float, most: float) -> None:
-        assert ramp(-current, -command, most) == -ramp(current, command, most)
+        assert ramp(-current, -command, most, most) == -ramp(current, command, most, most)
 
     def test_equations_3_and_4_by_hand(self) -> None:
-        assert ramp(0.5, 0.52, 0.03) == 0.52
-        assert ramp(0.5, 1.0, 0.03) == 0.53
-        assert ramp(0.5, -1.0, 0.03) == 0.47
+        assert ramp(0.5, 0.52, 0.03, 0.03) == 0.52
+        assert ramp(0.5, 1.0, 0.03, 0.03) == 0.53
+        assert ramp(0.5, -1.0, 0.03, 0.03) == 0.47
 
 
 @given(st.floats(-5.0, 5.0), st.floats(-5.0, 0.0), st.floats(0.0, 5.0))
@@ -251,8 +251,8 @@ class TestWholeSteps:
         self, pose: Pose, v: float, omega: float, v_command: float, omega_command: float, dt: float
     ) -> None:
         state = dynamic_step(*pose, v, omega, (v_command, omega_command), LIMITS, dt)
-        assert state[3] == ramp(v, v_command, LIMITS.acceleration * dt)
-        assert state[4] == ramp(omega, omega_command, LIMITS.angular_acceleration * dt)
+        assert state[3] == ramp(v, v_command, LIMITS.acceleration * dt, LIMITS.acceleration * dt)
+        assert state[4] == ramp(omega, omega_command, *2 * (LIMITS.angular_acceleration * dt,))
         assert state[:3] == unicycle_step(*pose, v, omega, state[3], state[4], dt)
 
     @given(poses, speeds, rates, durations)
@@ -281,7 +281,7 @@ def test_compiled_and_plain_kernels_agree(
     close = {"rel": 1e-15, "abs": 1e-15}
     assert wrap_angle(4.0 * pose[0]) == plain(wrap_angle)(4.0 * pose[0])
     assert clamp(v0, -1.0, 1.0) == plain(clamp)(v0, -1.0, 1.0)
-    assert ramp(v0, v1, 0.1) == plain(ramp)(v0, v1, 0.1)
+    assert ramp(v0, v1, 0.1, 0.1) == plain(ramp)(v0, v1, 0.1, 0.1)
     assert unicycle_step(*pose, *motion, duration) == pytest.approx(
         plain(unicycle_step)(*pose, *motion, duration), **close
     )

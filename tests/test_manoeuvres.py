@@ -71,7 +71,7 @@ class TestNextVelocity:
     ) -> None:
         velocity, at, steps = (2.0 * share - 1.0) * high, 0.0, 0
         while velocity != 0.0 or abs(way - at) > 1e-9 or steps == 0:
-            after = next_velocity(way - at, velocity, -high, high, most * DT, DT)
+            after = next_velocity(way - at, velocity, -high, high, most * DT, most * DT, DT)
             assert abs(after) <= high
             assert abs(after - velocity) <= most * DT * (1.0 + 1e-12)
             at += 0.5 * (velocity + after) * DT
@@ -85,7 +85,7 @@ class TestNextVelocity:
         quickest = way / peak + peak / most if peak > 0.0 else 0.0
         velocity, at, steps = 0.0, 0.0, 0
         while steps * DT <= quickest + 2.0 * DT:
-            after = next_velocity(way - at, velocity, 0.0, high, most * DT, DT)
+            after = next_velocity(way - at, velocity, 0.0, high, most * DT, most * DT, DT)
             at, velocity, steps = at + 0.5 * (velocity + after) * DT, after, steps + 1
         assert velocity == 0.0
         assert at == pytest.approx(way, abs=1e-9)

@@ -106,7 +106,7 @@ def test_keys_of_other_programs_are_answered_with_ours(key: str, words: str) -> 
 def test_a_parameter_file_of_nav2_makes_a_robot_and_the_tolerances_of_the_goal(tmp_path: Path) -> None:
     (tmp_path / "nav2.yaml").write_text(DWB)
     found = scenario({"nav2": "nav2.yaml"}, tmp_path, theta=1.0)
-    assert found.robot == Robot(Footprint.disc(0.22), Limits(-0.1, 0.26, -1.0, 1.0, 2.0, 3.2))
+    assert found.robot == Robot(Footprint.disc(0.22), Limits(-0.1, 0.26, -1.0, 1.0, 2.5, 3.2, deceleration=2.0))
     assert found.goal == Goal(8.0, 8.0, 0.15, 1.0, 0.2)
     assert scenario({"nav2": "nav2.yaml"}, tmp_path).goal == Goal(8.0, 8.0, 0.15)
 
@@ -124,7 +124,7 @@ def test_what_the_scenario_says_itself_comes_before_the_parameter_file(tmp_path:
 def test_the_first_controller_comes_before_the_velocity_smoother_and_the_local_costmap_first(tmp_path: Path) -> None:
     (tmp_path / "nav2.yaml").write_text(PURE_PURSUIT)
     robot = scenario({"nav2": "nav2.yaml"}, tmp_path).robot
-    assert robot.limits == Limits(-0.3, 0.5, -1.8, 1.8, 1.2, 3.2)
+    assert robot.limits == Limits(-0.3, 0.5, -1.8, 1.8, 1.5, 3.2, deceleration=1.2)
     assert robot.footprint.vertices is not None
     np.testing.assert_allclose(np.abs(robot.footprint.vertices), [[0.25, 0.15]] * 4)
 

@@ -22,10 +22,11 @@ from cbrrt_ompl.motion.model import CLOSED_LOOP, OPEN_LOOP, STEERING, advance, m
 from cbrrt_ompl.motion.records import record_array
 from cbrrt_ompl.planners.roll_out import BLOCK, STEPS, integrate_block, state_at
 from cbrrt_ompl.problem.obstacles import Bounds, Box
-from cbrrt_ompl.problem.robot import Gains, Limits, Robot
+from cbrrt_ompl.problem.robot import Gains, Limits, Robot, decelerations
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.scenario.scenario import Scenario
 from cbrrt_ompl.trajectory.trajectory import Trajectory
+from cbrrt_ompl.verification.velocities import acceleration_limits, allowed_rates
 
 DT = 0.05
 velocities = st.tuples(st.floats(-6.0, 6.0), st.floats(-6.0, 6.0))
@@ -119,21 +120,30 @@ class TestSaturation:
         assert limits.v_min <= v <= limits.v_max and limits.omega_min <= omega <= limits.omega_max
 
 
+def rates_between(before: tuple[float, float], after: tuple[float, float], limits: Limits) -> NDArray[np.float64]:
+    """Rates at which v and omega may change, by the rule that verify has for itself, shape (2,)."""
+    both = acceleration_limits(limits)
+    return np.array([allowed_rates(a, b, *rates) for a, b, rates in zip(before, after, both, strict=True)])
+
+
 class TestJointRamp:
     @given(WHEELED, SHARES, SHARES, SHARES, SHARES)
     def test_it_keeps_all_limits_and_reaches_the_command(
         self, limits: Limits, a: float, b: float, c: float, d: float
     ) -> None:
         velocity, command = inside(limits, a, b), inside(limits, c, d)
-        most = 12.0 / min(limits.acceleration, limits.angular_acceleration, limits.wheel_acceleration, 1.0) / DT
+        most = 12.0 / min(*limits[4:6], *limits[8:], 1.0) / DT
         for _ in range(int(3.0 * most * max(1.0, limits.wheel_separation))):
             if velocity == command:
                 break
             before, velocity = velocity, joint_ramp(*velocity, *command, limits, DT)
             dv, domega = velocity[0] - before[0], velocity[1] - before[1]
             slack = 2e-11 * DT + 1e-14
-            assert abs(dv) <= limits.acceleration * DT + slack
-            assert abs(domega) <= limits.angular_acceleration * DT + slack
+            rates = (
+                allowed_rates(*pair, *both)
+                for *pair, both in zip(before, velocity, acceleration_limits(limits), strict=True)
+            )
+            assert (np.abs([dv, domega]) <= np.array(list(rates)) * DT + slack).all()
             assert rim(dv, domega, limits) <= limits.wheel_acceleration * DT + slack
             assert limits.v_min <= velocity[0] <= limits.v_max
             assert limits.omega_min <= velocity[1] <= limits.omega_max
@@ -154,7 +164,11 @@ class TestJointRamp:
     ) -> None:
         found = joint_ramp(*velocity, *command, limits, DT)
         dv, domega = abs(found[0] - velocity[0]), abs(found[1] - velocity[1])
-        used = (dv / limits.acceleration, domega / limits.angular_acceleration)
+        rates = [
+            allowed_rates(a, b, *both)
+            for a, b, both in zip(velocity, command, acceleration_limits(limits), strict=True)
+        ]
+        used = (dv / rates[0], domega / rates[1])
         most = max(*used, (dv + 0.5 * limits.wheel_separation * domega) / limits.wheel_acceleration)
         assert found == command or most == pytest.approx(DT, rel=1e-9)
 
@@ -164,8 +178,8 @@ class TestJointRamp:
     ) -> None:
         free = limits._replace(wheel_speed=math.inf, wheel_acceleration=math.inf)
         state = dynamic_step(0.0, 0.0, 0.0, *velocity, command, free, DT)
-        assert state[3] == ramp(velocity[0], command[0], free.acceleration * DT)
-        assert state[4] == ramp(velocity[1], command[1], free.angular_acceleration * DT)
+        assert state[3] == ramp(velocity[0], command[0], free.acceleration * DT, decelerations(free)[0] * DT)
+        assert state[4] == ramp(velocity[1], command[1], free.angular_acceleration * DT, decelerations(free)[1] * DT)
 
 
 @pytest.mark.parametrize("law", [OPEN_LOOP, STEERING])

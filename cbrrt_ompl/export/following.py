@@ -159,14 +159,13 @@ def bounded(old: NDArray[np.float64], new: NDArray[np.float64], dt: float, limit
     if rim > limits.wheel_speed:
         new = new * (limits.wheel_speed / rim)
     change = new - old
-    duration = max(abs(change[0]) / limits.acceleration, abs(change[1]) / limits.angular_acceleration)
-    duration = max(duration, (abs(change[0]) + half * abs(change[1])) / limits.wheel_acceleration)
-    if duration <= dt:
-        return new
-    if limits.has_wheel_limits:
-        return old + change * (dt / duration)
-    most = dt * np.array([limits.acceleration, limits.angular_acceleration])
-    return old + np.clip(change, -most, most)
+    within = limits.bounded_change(old, change, dt)
+    if not limits.has_wheel_limits:
+        return np.where(within == change, new, old + within)
+    rim_change = abs(change[0]) + half * abs(change[1])
+    fractions = [dt * limits.wheel_acceleration / rim_change] if rim_change > dt * limits.wheel_acceleration else [1.0]
+    fractions += [part / whole for part, whole in zip(within, change, strict=True) if part != whole]
+    return new if min(fractions) == 1.0 else old + change * min(fractions)
 
 
 class Disturbance(NamedTuple):

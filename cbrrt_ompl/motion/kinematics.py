@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cbrrt_ompl.kernels import kernel
-from cbrrt_ompl.problem.robot import Limits
+from cbrrt_ompl.problem.robot import REST, Limits
+from cbrrt_ompl.problem.robot import decelerations as _decelerations
+from cbrrt_ompl.problem.robot import velocity_changes as _velocity_changes
 
 
 @kernel
@@ -36,23 +38,31 @@ def clamp(value: float, low: float, high: float) -> float:
     return low if value < low else high if value > high else value
 
 
+decelerations, velocity_changes = kernel(_decelerations), kernel(_velocity_changes)
+
+
 @kernel
-def ramp(current: float, command: float, largest_change: float) -> float:
+def ramp(current: float, command: float, faster: float, slower: float) -> float:
     """Velocity one step later: Eq. (3) and (4) of the paper.
 
     Args:
         current: present velocity.
         command: velocity asked for.
-        largest_change: a or alpha of the paper, the most that the velocity may change in this step.
+        faster: a or alpha of the paper, the most that the velocity may grow in this step.
+        slower: the most that it may shrink.
 
     Returns:
         The command where it is in reach, else the velocity nearest to it.
+
+    Note:
+        The paper has one limit for both.
     """
     change = command - current
-    if change > largest_change:
-        return current + largest_change
-    if change < -largest_change:
-        return current - largest_change
+    fall, rise = velocity_changes(current, faster, slower)
+    if change > rise:
+        return current + rise
+    if change < -fall:
+        return current - fall
     return command
 
 
@@ -109,7 +119,10 @@ def axis_limits(limits: Limits) -> Limits:
             limits.wheel_separation,
             limits.wheel_speed,
             limits.wheel_acceleration,
+            limits.deceleration,
+            limits.angular_deceleration,
         )
+    slower, turns_slower = decelerations(limits)
     arm = 0.5 * limits.wheel_separation
     v_top, omega_top = limits.wheel_speed, INSIDE * limits.wheel_speed / arm
     return Limits(
@@ -122,27 +135,46 @@ def axis_limits(limits: Limits) -> Limits:
         limits.wheel_separation,
         limits.wheel_speed,
         limits.wheel_acceleration,
+        min(slower, limits.wheel_acceleration),
+        min(turns_slower, limits.wheel_acceleration / arm),
     )
 
 
 @kernel
-def joint_ramp_time(dv: float, domega: float, limits: Limits) -> float:
-    """Time in which both velocities change by (dv, domega) at once, [m/s, rad/s] to [s]."""
+def ramp_rate(velocity: float, change: float, faster: float, slower: float) -> float:
+    """Rate at which a velocity changes by an amount: the lesser of both where that leads through rest."""
+    if velocity * change >= 0.0 or abs(velocity) <= REST:
+        return faster
+    return slower if abs(change) <= abs(velocity) else min(faster, slower)
+
+
+@kernel
+def joint_ramp_time(v: float, omega: float, v_command: float, omega_command: float, limits: Limits) -> float:
+    """Time in which both velocities change at once from some values to others [s]."""
+    dv, domega = v_command - v, omega_command - omega
+    slower, turns_slower = decelerations(limits)
     size, turn = abs(dv), abs(domega)
-    time = max(size / limits.acceleration, turn / limits.angular_acceleration)
+    time = max(
+        size / ramp_rate(v, dv, limits.acceleration, slower),
+        turn / ramp_rate(omega, domega, limits.angular_acceleration, turns_slower),
+    )
     return max(time, (size + 0.5 * limits.wheel_separation * turn) / limits.wheel_acceleration)
 
 
 @kernel
 def stopping_time(v: float, omega: float, limits: Limits) -> float:
     """Time in which a robot that brakes no longer drives, though it may still turn [s]."""
-    return joint_ramp_time(v, omega, limits) if has_wheel_limits(limits) else abs(v) / limits.acceleration
+    if has_wheel_limits(limits):
+        return joint_ramp_time(v, omega, 0.0, 0.0, limits)
+    return abs(v) / decelerations(limits)[0]
 
 
 @kernel
 def stopping_time_of_turn(v: float, omega: float, limits: Limits) -> float:
     """Time in which a robot that brakes no longer turns, though it may still drive [s]."""
-    return joint_ramp_time(v, omega, limits) if has_wheel_limits(limits) else abs(omega) / limits.angular_acceleration
+    if has_wheel_limits(limits):
+        return joint_ramp_time(v, omega, 0.0, 0.0, limits)
+    return abs(omega) / decelerations(limits)[1]
 
 
 @kernel
@@ -169,7 +201,7 @@ def joint_ramp(
         The paper ramps v and omega independently of each other: :func:`ramp`, for robots without wheel limits.
     """
     dv, domega = v_command - v, omega_command - omega
-    needed = joint_ramp_time(dv, domega, limits)
+    needed = joint_ramp_time(v, omega, v_command, omega_command, limits)
     if needed <= dt * WITHIN:
         return v_command, omega_command
     share = dt / needed
@@ -303,8 +335,9 @@ def dynamic_step(
     if has_wheel_limits(limits):
         v_next, omega_next = joint_ramp(v, omega, command[0], command[1], limits, dt)
     else:
-        v_next = ramp(v, command[0], limits.acceleration * dt)
-        omega_next = ramp(omega, command[1], limits.angular_acceleration * dt)
+        slower, turns_slower = decelerations(limits)
+        v_next = ramp(v, command[0], limits.acceleration * dt, slower * dt)
+        omega_next = ramp(omega, command[1], limits.angular_acceleration * dt, turns_slower * dt)
     x, y, theta = unicycle_step(x, y, theta, v, omega, v_next, omega_next, dt)
     return x, y, theta, v_next, omega_next
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from cbrrt_ompl.kernels import kernel
-from cbrrt_ompl.motion.kinematics import axis_limits, clamp, wrap_angle
+from cbrrt_ompl.motion.kinematics import axis_limits, clamp, decelerations, velocity_changes, wrap_angle
 from cbrrt_ompl.problem.robot import Limits
 
 FORWARD, REVERSE, BRAKE = 8.0, 9.0, 10.0
@@ -36,11 +36,13 @@ def is_manoeuvre(control: tuple[float, float, float]) -> bool:
 
 
 @kernel
-def next_velocity(way: float, velocity: float, low: float, high: float, largest_change: float, dt: float) -> float:
+def next_velocity(
+    way: float, velocity: float, low: float, high: float, faster: float, slower: float, dt: float
+) -> float:
     """Velocity one step later, on the quickest way to come to rest after exactly a given way.
 
-    Under velocities that are linear in each step, the way from v to rest, with the largest change in every step but the
-    last, is piecewise linear in v. The velocity returned is the one from which that way ends on the spot, if it is
+    Under velocities that are linear in each step, the way from v to rest, with the largest decrease in every step but
+    the last, is piecewise linear in v. The velocity returned is the one from which that way ends on the spot, if it is
     within the range and the change.
 
     Args:
@@ -48,15 +50,17 @@ def next_velocity(way: float, velocity: float, low: float, high: float, largest_
         velocity: present velocity [m/s or rad/s].
         low: smallest velocity.
         high: largest velocity.
-        largest_change: the most that the velocity may change in a step.
+        faster: the most that the velocity may grow in a step.
+        slower: the most that it may shrink.
         dt: duration of a step [s].
     """
     left = way - 0.5 * velocity * dt
-    full_steps = math.floor(0.5 * (math.sqrt(1.0 + 8.0 * abs(left) / (largest_change * dt)) - 1.0))
-    rest = abs(left) - 0.5 * largest_change * dt * full_steps * (full_steps + 1.0)
-    wanted = math.copysign(full_steps * largest_change + rest / ((full_steps + 1.0) * dt), left)
-    found = clamp(clamp(wanted, low, high), velocity - largest_change, velocity + largest_change)
-    return 0.0 if abs(found) < AT_REST and abs(velocity) <= largest_change else found
+    full_steps = math.floor(0.5 * (math.sqrt(1.0 + 8.0 * abs(left) / (slower * dt)) - 1.0))
+    rest = abs(left) - 0.5 * slower * dt * full_steps * (full_steps + 1.0)
+    wanted = math.copysign(full_steps * slower + rest / ((full_steps + 1.0) * dt), left)
+    fall, rise = velocity_changes(velocity, faster, slower)
+    found = clamp(clamp(wanted, low, high), velocity - fall, velocity + rise)
+    return 0.0 if abs(found) < AT_REST and abs(velocity) <= slower else found
 
 
 @kernel
@@ -85,6 +89,7 @@ def approach_command(
     """
     x, y, theta, v, omega = state
     limits = axis_limits(limits)
+    slower, turns_slower = decelerations(limits)
     dx, dy = aim[0] - x, aim[1] - y
     c, s = math.cos(theta), math.sin(theta)
     along, aside = c * dx + s * dy, c * dy - s * dx
@@ -96,7 +101,8 @@ def approach_command(
         if omega == 0.0 and abs(aside) <= 0.5 * REACHED and along * sign > 0.0:
             if is_kinematic:
                 return clamp(along / dt, limits.v_min, limits.v_max), 0.0
-            return next_velocity(along, v, limits.v_min, limits.v_max, limits.acceleration * dt, dt), 0.0
+            faster = limits.acceleration
+            return next_velocity(along, v, limits.v_min, limits.v_max, faster * dt, slower * dt, dt), 0.0
         turn = math.atan2(aside * sign, along * sign)
     elif has_heading:
         turn = wrap_angle(aim[2] - theta)
@@ -106,8 +112,8 @@ def approach_command(
         turn += 2.0 * math.pi
     if is_kinematic:
         return 0.0, clamp(turn / dt, limits.omega_min, limits.omega_max)
-    change = limits.angular_acceleration * dt
-    return 0.0, next_velocity(turn, omega, limits.omega_min, limits.omega_max, change, dt)
+    faster = limits.angular_acceleration
+    return 0.0, next_velocity(turn, omega, limits.omega_min, limits.omega_max, faster * dt, turns_slower * dt, dt)
 
 
 @kernel
@@ -133,10 +139,12 @@ def most_steps(manoeuvre: float, distance: float, limits: Limits, dt: float) -> 
     """Steps within which every manoeuvre has ended, an approach over a distance [m] at its start."""
     limits = axis_limits(limits)
     v_range, omega_range = limits.v_max - limits.v_min, limits.omega_max - limits.omega_min
-    stop = v_range / limits.acceleration + omega_range / limits.angular_acceleration
+    slower, turns_slower = decelerations(limits)
+    rate, turning_rate = min(limits.acceleration, slower), min(limits.angular_acceleration, turns_slower)
+    stop = v_range / rate + omega_range / turning_rate
     if manoeuvre == BRAKE:
         return int(stop / dt) + 2
     v_top = -limits.v_min if manoeuvre == REVERSE else limits.v_max
     omega_top = limits.omega_max if limits.omega_min == 0.0 else min(-limits.omega_min, limits.omega_max)
-    way = distance + v_range * v_range / limits.acceleration
+    way = distance + v_range * v_range / rate
     return int((way / v_top + 8.0 * math.pi / omega_top + 8.0 * stop) / dt) + 100

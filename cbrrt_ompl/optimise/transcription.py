@@ -20,7 +20,7 @@ from cbrrt_ompl.optimise.inequalities import lay_out_rows
 from cbrrt_ompl.optimise.interior_point import PROGRESS, SOLVE_RUNNING, iterate
 from cbrrt_ompl.optimise.objective import Objective
 from cbrrt_ompl.optimise.program import OMEGA, PROBLEM, STAGE, STEP, THETA, V
-from cbrrt_ompl.problem.robot import Limits
+from cbrrt_ompl.problem.robot import Limits, decelerations
 from cbrrt_ompl.problem.settings import Goal
 from cbrrt_ompl.scenario.scenario import Scenario
 from cbrrt_ompl.trajectory.trajectory import Trajectory
@@ -168,9 +168,16 @@ def velocity_rows(limits: Limits) -> NDArray[np.float64]:
 
 def acceleration_rows(limits: Limits) -> NDArray[np.float64]:
     """Rows (c, c_a, c_alpha) with c + c_a a + c_alpha alpha >= 0 within all limits, shape (n, 3)."""
-    rows = [(limits.acceleration, sign, 0.0) for sign in (-1.0, 1.0)]
-    rows += [(limits.angular_acceleration, 0.0, sign) for sign in (-1.0, 1.0)]
+    slower, turns_slower = decelerations(limits)
+    rise, fall = _changes(limits.v_min, limits.acceleration, slower)
+    turn_rise, turn_fall = _changes(limits.omega_min, limits.angular_acceleration, turns_slower)
+    rows = [(rise, -1.0, 0.0), (fall, 1.0, 0.0), (turn_rise, 0.0, -1.0), (turn_fall, 0.0, 1.0)]
     return _inside([*rows, *_wheel_rows(limits.wheel_acceleration, limits)])
+
+
+def _changes(lowest: float, faster: float, slower: float) -> tuple[float, float]:
+    """Largest rates at which a velocity rises and falls: the lesser one for both where it may have either sign."""
+    return (faster, slower) if lowest == 0.0 else (min(faster, slower), min(faster, slower))
 
 
 def _wheel_rows(most: float, limits: Limits) -> list[tuple[float, float, float]]:

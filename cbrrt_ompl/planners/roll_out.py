@@ -11,6 +11,7 @@ from cbrrt_ompl.collision.motion_check import check_step_motion, lever_arm, way_
 from cbrrt_ompl.collision.scene import Scene
 from cbrrt_ompl.kernels import inner_kernel, kernel
 from cbrrt_ompl.motion.kinematics import (
+    decelerations,
     displacement,
     has_wheel_limits,
     joint_ramp,
@@ -75,9 +76,12 @@ def integrate_block(steps: Record, v_command: float, omega_command: float, count
             omega = omega_next
             vs[i + 1], omegas[i + 1], thetas[i + 1] = v, omega, theta
     else:
-        most, most_angular = limits.acceleration * dt, limits.angular_acceleration * dt
+        slower, turns_slower = decelerations(limits)
+        faster, turns_faster = limits.acceleration * dt, limits.angular_acceleration * dt
+        slower, turns_slower = slower * dt, turns_slower * dt
         for i in range(count):
-            v, omega_next = ramp(v, v_command, most), ramp(omega, omega_command, most_angular)
+            v = ramp(v, v_command, faster, slower)
+            omega_next = ramp(omega, omega_command, turns_faster, turns_slower)
             middles[i] = middle_heading(theta, omega, omega_next, dt)
             theta = wrap_angle(theta + 0.5 * (omega + omega_next) * dt)
             omega = omega_next

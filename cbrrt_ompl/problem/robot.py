@@ -13,8 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 from cbrrt_ompl.checks import A_NUMBER, A_POSITIVE_NUMBER, LARGEST, SMALLEST, counter_clockwise_ring, is_number
 from cbrrt_ompl.errors import Problem, RobotError, WorldError
 
-_UNLIMITED = ("acceleration", "angular_acceleration", "wheel_speed", "wheel_acceleration")
+_UNLIMITED = (
+    *("acceleration", "angular_acceleration", "wheel_speed", "wheel_acceleration"),
+    *("deceleration", "angular_deceleration"),
+)
 """Limits that may be infinite."""
+
+
+REST = 1e-9
+"""Velocities up to this are rounding of a rest [m/s, rad/s]."""
 
 
 class Limits(NamedTuple):
@@ -41,6 +48,10 @@ class Limits(NamedTuple):
     """Largest speed of a wheel over the ground, |v| + |omega| wheel_separation / 2 [m/s]."""
     wheel_acceleration: float = math.inf
     """Largest change of a wheel's speed [m/s^2]."""
+    deceleration: float = math.inf
+    """Largest decrease of |v| [m/s^2]; infinite where the acceleration is that, too."""
+    angular_deceleration: float = math.inf
+    """Largest decrease of |omega| [rad/s^2]; infinite where the angular acceleration is that, too."""
 
     @property
     def has_wheel_limits(self) -> bool:
@@ -51,6 +62,19 @@ class Limits(NamedTuple):
     def is_first_order(self) -> bool:
         """Whether nothing limits the accelerations, so that the velocities jump."""
         return self.acceleration == math.inf
+
+    def bounded_change(self, velocity: ArrayLike, change: ArrayLike, duration: float) -> NDArray[np.float64]:
+        """A change of both velocities cut to what the accelerations allow, each by itself.
+
+        Args:
+            velocity: v and omega before it, shape (2,) [m/s, rad/s].
+            change: what is wanted, shape (2,).
+            duration: time for it, in which the velocities are linear [s].
+        """
+        rates = zip((self.acceleration, self.angular_acceleration), decelerations(self), strict=True)
+        steps = zip(np.asarray(velocity, dtype=float), rates, strict=True)
+        bounds = np.array([velocity_changes(v, up * duration, down * duration) for v, (up, down) in steps])  # (2, 2)
+        return np.clip(change, -bounds[:, 0], bounds[:, 1])
 
     def problems(self) -> list[Problem]:
         """What is wrong with these limits, one entry a mistake."""
@@ -70,9 +94,10 @@ class Limits(NamedTuple):
         for name in _UNLIMITED:
             if getattr(self, name) < SMALLEST:
                 found.append(Problem(f"limits.{name}", getattr(self, name), A_POSITIVE_NUMBER))
-        if self.is_first_order and self.wheel_acceleration < math.inf:
-            expected = "no limit for a robot without one of its acceleration"
-            found.append(Problem("limits.wheel_acceleration", self.wheel_acceleration, expected))
+        for name in ("wheel_acceleration", "deceleration", "angular_deceleration"):
+            if self.is_first_order and getattr(self, name) < math.inf:
+                expected = "no limit for a robot without one of its acceleration"
+                found.append(Problem(f"limits.{name}", getattr(self, name), expected))
         if self.is_first_order != (self.angular_acceleration == math.inf):
             limit = f"{'a' if self.angular_acceleration == math.inf else 'no'} limit, as of the acceleration"
             found.append(Problem("limits.angular_acceleration", self.angular_acceleration, limit))
@@ -80,6 +105,36 @@ class Limits(NamedTuple):
             expected = "the distance between the wheels, above 0 [m]"
             found.append(Problem("limits.wheel_separation", self.wheel_separation, expected))
         return found
+
+
+def decelerations(limits: Limits) -> tuple[float, float]:
+    """Largest decreases of |v| and |omega| [m/s^2, rad/s^2]; kernels are made of this, too."""
+    slower, turns_slower = limits.deceleration, limits.angular_deceleration
+    return (
+        slower if slower < math.inf else limits.acceleration,
+        turns_slower if turns_slower < math.inf else limits.angular_acceleration,
+    )
+
+
+def velocity_changes(velocity: float, faster: float, slower: float) -> tuple[float, float]:
+    """How far a velocity may fall and rise in a step, in which it is linear in time; kernels are made of this, too.
+
+    A step that leads through rest is one of deceleration and of acceleration, and keeps the lesser limit; what is no
+    faster than `REST` is at rest.
+
+    Args:
+        velocity: at the start of the step.
+        faster: most that its magnitude may grow.
+        slower: most that its magnitude may shrink.
+
+    Returns:
+        Largest decrease and largest increase, both 0 or more.
+    """
+    if abs(velocity) <= REST or faster == slower:
+        return faster, faster
+    size = abs(velocity)
+    back = slower if slower <= size else max(size, min(faster, slower))
+    return (back, faster) if velocity > 0.0 else (faster, back)
 
 
 class Gains(NamedTuple):

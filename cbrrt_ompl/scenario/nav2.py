@@ -46,10 +46,10 @@ FOREIGN_KEYS: dict[str, str] = {
     **dict.fromkeys(
         (*FASTEST_TURN, "min_vel_theta", "max_speed_theta"), "robot.limits.omega: [least, largest] [rad/s]"
     ),
-    **dict.fromkeys((*ACCELERATION, *DECELERATION), "robot.limits.acceleration [m/s^2], the lesser of both"),
-    **dict.fromkeys(
-        (*TURN_ACCELERATION, *TURN_DECELERATION), "robot.limits.angular_acceleration [rad/s^2], the lesser of both"
-    ),
+    **dict.fromkeys(ACCELERATION, "robot.limits.acceleration [m/s^2]"),
+    **dict.fromkeys(DECELERATION, "robot.limits.deceleration [m/s^2]"),
+    **dict.fromkeys(TURN_ACCELERATION, "robot.limits.angular_acceleration [rad/s^2]"),
+    **dict.fromkeys(TURN_DECELERATION, "robot.limits.angular_deceleration [rad/s^2]"),
     **dict.fromkeys(("wheel_track", "wheelbase", "track_width"), "robot.limits.wheel_separation [m]"),
     **dict.fromkeys(("footprint_padding", "padding", "inflation_radius", "inflation"), _MARGIN),
     "xy_goal_tolerance": "goal.tolerance [m]",
@@ -85,7 +85,7 @@ def nav2_robot(value: object, path: str, report: Report) -> Nav2Robot | None:
 
     Limits are those of the first controller (``controller_plugins``), then of the velocity smoother, then of any
     section; the footprint is the local costmap's, then the global one's, padded by ``footprint_padding`` as Nav2 pads.
-    Of acceleration and deceleration the lesser is taken.
+    Where there is one of acceleration and deceleration alone, it is both.
     """
     name = text(value, path, report)
     if name is None:
@@ -157,16 +157,24 @@ def _limits_of(sections: list[Mapping[Any, Any]]) -> dict[str, float]:
         "v_min": None if fastest is None else min(slowest or 0.0, 0.0),
         "omega_max": None if turn is None else abs(turn),
         "omega_min": None if turn is None else -abs(turn),
-        "acceleration": _lesser(sections, ACCELERATION, DECELERATION),
-        "angular_acceleration": _lesser(sections, TURN_ACCELERATION, TURN_DECELERATION),
+        **_changes(sections, "acceleration", ACCELERATION, "deceleration", DECELERATION),
+        **_changes(sections, "angular_acceleration", TURN_ACCELERATION, "angular_deceleration", TURN_DECELERATION),
     }
     return {name: value for name, value in found.items() if value is not None}
 
 
-def _lesser(sections: list[Mapping[Any, Any]], up: tuple[str, ...], down: tuple[str, ...]) -> float | None:
-    """The lesser of an acceleration and a deceleration, whose sign is a matter of taste; 0 is taken for none."""
-    values = [abs(value) for value in (_first(sections, up), _first(sections, down)) if value]
-    return min(values, default=None)
+def _changes(
+    sections: list[Mapping[Any, Any]], faster: str, up: tuple[str, ...], slower: str, down: tuple[str, ...]
+) -> dict[str, float]:
+    """Acceleration and deceleration of the first section that has one, under two names, the latter if it differs.
+
+    The sign is a matter of taste, and 0 is taken for none.
+    """
+    for section in sections:
+        gain, loss = (abs(_first([section], names) or 0.0) for names in (up, down))
+        if gain or loss:
+            return {faster: gain or loss} | ({slower: loss} if gain and loss and gain != loss else {})
+    return {}
 
 
 def _smoother(section: Mapping[Any, Any]) -> dict[str, Any]:

@@ -195,6 +195,8 @@ LIMITS = {
     "omega": Key(_range, is_angle=True),
     "acceleration": Key(number_or_unlimited),
     "angular_acceleration": Key(number_or_unlimited, is_angle=True),
+    "deceleration": Key(number),
+    "angular_deceleration": Key(number, is_angle=True),
     "wheel_separation": Key(number),
     "wheel_speed": Key(number_or_unlimited),
     "wheel_acceleration": Key(number_or_unlimited),
@@ -287,17 +289,18 @@ def robot_data(robot: Robot) -> dict[str, Any]:
             "omega": _floats((limits.omega_min, limits.omega_max)),
             "acceleration": UNLIMITED if limits.is_first_order else float(limits.acceleration),
             "angular_acceleration": UNLIMITED if limits.is_first_order else float(limits.angular_acceleration),
-            **_wheel_data(limits),
+            **_own_limits(limits, "deceleration", "angular_deceleration"),
+            **({"wheel_separation": float(limits.wheel_separation)} if limits.wheel_separation else {}),
+            **_own_limits(limits, "wheel_speed", "wheel_acceleration"),
         },
         **({} if robot.gains is None else {"gains": {k: float(value) for k, value in robot.gains._asdict().items()}}),
     }
 
 
-def _wheel_data(limits: Limits) -> dict[str, float]:
-    """The limits of the wheels that there are."""
-    separation = {"wheel_separation": float(limits.wheel_separation)} if limits.wheel_separation else {}
-    given = {name: float(getattr(limits, name)) for name in ("wheel_speed", "wheel_acceleration")}
-    return separation | {name: value for name, value in given.items() if value < math.inf}
+def _own_limits(limits: Limits, *names: str) -> dict[str, float]:
+    """Those of some limits that there are."""
+    given = {name: float(getattr(limits, name)) for name in names}
+    return {name: value for name, value in given.items() if value < math.inf}
 
 
 def _goal_data(goal: Goal) -> dict[str, Any]:

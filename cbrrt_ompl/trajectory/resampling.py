@@ -174,8 +174,7 @@ def _within(
         new = new * (limits.wheel_speed / rim)
     if kinematic:
         return new
-    most = dt * np.array([limits.acceleration, limits.angular_acceleration])
-    change = np.clip(new - old, -most, most)
+    change = limits.bounded_change(old, new - old, dt)
     rim_change = abs(change[0]) + 0.5 * limits.wheel_separation * abs(change[1])
     if rim_change > dt * limits.wheel_acceleration:
         change *= dt * limits.wheel_acceleration / rim_change

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cbrrt_ompl.trajectory.trajectory import Trajectory
-from cbrrt_ompl.verification.velocities import wheel_speeds
-from cbrrt_ompl.verification.violation import UNITS, Violation, broken_condition
+from cbrrt_ompl.verification.velocities import acceleration_limits, allowed_rates, wheel_speeds
+from cbrrt_ompl.verification.violation import UNITS, Violation, broken_condition, rates_text
 
 if TYPE_CHECKING:
     from cbrrt_ompl.problem.robot import Limits
@@ -35,9 +35,10 @@ def limit_violations(trajectory: Trajectory, limits: Limits) -> Iterator[Violati
 def acceleration_violations(trajectory: Trajectory, limits: Limits) -> Iterator[Violation]:
     """Velocities that change faster than the limits allow."""
     steps = np.diff(trajectory.t)
-    for name, most in (("v", limits.acceleration), ("omega", limits.angular_acceleration)):
+    for name, rates in zip(("v", "omega"), acceleration_limits(limits), strict=True):
         values = getattr(trajectory, name)
         changes = np.diff(values)
+        most = allowed_rates(values[:-1], values[1:], *rates)
         rounding = 4.0 * np.spacing(np.maximum(np.abs(values[1:]), np.abs(values[:-1])))
         rounding += 4.0 * most * np.spacing(np.abs(trajectory.t[1:]))
         broken = ~(np.abs(changes) <= most * steps * (1.0 + _SLACK) + rounding)
@@ -45,7 +46,7 @@ def acceleration_violations(trajectory: Trajectory, limits: Limits) -> Iterator[
         yield from broken_condition(
             "acceleration",
             f"{name} changes by {{}} {unit}",
-            f"limit {most:.6g} {unit}",
+            f"limit {rates_text(*rates)} {unit}",
             changes / steps,
             broken,
             trajectory.t[:-1],

@@ -11,8 +11,8 @@ from cbrrt_ompl.problem.settings import State
 from cbrrt_ompl.trajectory.track import Track
 from cbrrt_ompl.trajectory.trajectory import wrapped
 from cbrrt_ompl.verification.motion import Motion
-from cbrrt_ompl.verification.velocities import wheel_speeds
-from cbrrt_ompl.verification.violation import UNITS, Violation, broken_condition
+from cbrrt_ompl.verification.velocities import acceleration_limits, allowed_rates, wheel_speeds
+from cbrrt_ompl.verification.violation import UNITS, Violation, broken_condition, rates_text
 
 if TYPE_CHECKING:
     from cbrrt_ompl.problem.robot import Limits
@@ -61,10 +61,10 @@ def track_limit_violations(track: Track, limits: Limits, tolerance: float) -> It
     if track.kinematic:
         return
     steps = np.diff(times)
-    for name, values, most in (("v", v, limits.acceleration), ("omega", omega, limits.angular_acceleration)):
+    for name, values, both in zip(("v", "omega"), (v, omega), acceleration_limits(limits), strict=True):
         rates, unit = np.diff(values) / steps, f"{UNITS[name]}^2"
-        text, limit = f"{name} changes by {{}} {unit}", f"limit {most:.6g} {unit}"
-        broken = ~(np.abs(rates) <= most + tolerance)
+        text, limit = f"{name} changes by {{}} {unit}", f"limit {rates_text(*both)} {unit}"
+        broken = ~(np.abs(rates) <= allowed_rates(values[:-1], values[1:], *both) + tolerance)
         yield from broken_condition("acceleration", text, limit, rates, broken, times[:-1], "steps")
 
 

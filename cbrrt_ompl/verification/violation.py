@@ -66,6 +66,11 @@ def broken_condition(
     yield Violation(kind, first, message, len(where), last)
 
 
+def rates_text(faster: float, slower: float) -> str:
+    """An acceleration and its deceleration, one number where they are the same."""
+    return f"{faster:.6g}" if faster == slower else f"{faster:.6g} (slowing down {slower:.6g})"
+
+
 def place(pose: Sequence[float] | NDArray[np.float64]) -> str:
     """A pose in words."""
     x, y, theta = pose
