@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from cbrrt_ompl.one_libompl import load_one_libompl
+from cbrrt_ompl.shown import show_by
 
 if TYPE_CHECKING:
     from cbrrt_ompl.collision.world import World
@@ -117,6 +118,16 @@ _MODULES = {
 _HOME = {name: module for module, names in _MODULES.items() for name in names}
 
 load_one_libompl()
+
+
+def _png_of(value: object) -> bytes | None:
+    """What a value shows of itself in a notebook; matplotlib is imported when the first one does."""
+    from cbrrt_ompl.figures.notebook import png_of
+
+    return png_of(value)
+
+
+show_by(_png_of)
 
 
 def __getattr__(name: str) -> Any:

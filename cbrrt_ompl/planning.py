@@ -14,8 +14,8 @@ import numpy as np
 
 from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.collision.free_poses import nearest_free_pose
-from cbrrt_ompl.compiled_beside import compiled_beside
 from cbrrt_ompl.errors import Problem, SettingsError
+from cbrrt_ompl.kernels.beside import compiled_beside
 from cbrrt_ompl.motion.model import ROOM, check_step, jumps, make_model
 from cbrrt_ompl.ompl_plugin.availability import check_ompl, has_ompl
 from cbrrt_ompl.optimise.anytime import further_guesses, robust_search

@@ -15,7 +15,7 @@ COMPILE = """
 import os, signal, threading
 from numba import njit
 from numba.core.compiler_lock import global_compiler_lock
-from cbrrt_ompl.interrupts import hold_interrupts
+from cbrrt_ompl.kernels.interrupts import hold_interrupts
 
 hold_interrupts()
 

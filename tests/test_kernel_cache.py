@@ -12,7 +12,7 @@ from numba import config
 from numba.core.caching import _CacheLocator
 from numba.misc.appdirs import AppDirs
 
-from cbrrt_ompl.kernel_cache import drop_stale_kernels
+from cbrrt_ompl.kernels.cache import drop_stale_kernels
 
 
 @pytest.fixture

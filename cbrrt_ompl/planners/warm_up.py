@@ -6,7 +6,7 @@ import math
 from functools import cache
 
 from cbrrt_ompl.collision.world import Bounds, World
-from cbrrt_ompl.compiled_beside import compiled_beside
+from cbrrt_ompl.kernels.beside import compiled_beside
 from cbrrt_ompl.motion.model import OPEN_LOOP, make_model
 from cbrrt_ompl.motion.records import record_array
 from cbrrt_ompl.planners.growth import grow

@@ -11,7 +11,7 @@ from numba.core.caching import _CacheLocator
 from numba.misc.appdirs import AppDirs
 
 
-def drop_stale_kernels(package: Path = Path(__file__).parent) -> None:
+def drop_stale_kernels(package: Path = Path(__file__).parents[1]) -> None:
     """Delete cached kernels that are older than any module of the package.
 
     numba compiles a kernel again when its own file has changed, but not when a kernel of another file has that it calls

@@ -7,8 +7,8 @@ from typing import Any
 
 from numba import njit
 
-from cbrrt_ompl.interrupts import hold_interrupts
-from cbrrt_ompl.kernel_cache import drop_stale_kernels
+from cbrrt_ompl.kernels.cache import drop_stale_kernels
+from cbrrt_ompl.kernels.interrupts import hold_interrupts
 
 drop_stale_kernels()
 hold_interrupts()

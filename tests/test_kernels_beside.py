@@ -9,8 +9,8 @@ from types import ModuleType
 
 import pytest
 
-from cbrrt_ompl import compiled_beside as beside
-from cbrrt_ompl.compiled_beside import compiled_beside
+from cbrrt_ompl.kernels import beside
+from cbrrt_ompl.kernels.beside import compiled_beside
 
 MODULE = """
 import time
