@@ -222,7 +222,7 @@ def _plan_anytime(
     if search.has_reached_goal:
         improver.improve(search.trajectory(), planner)
     if improver.best is not None:
-        improver.explore(further_guesses(scenario, first_seed, improver.has_ended))
+        improver.explore(further_guesses(scenario, search, first_seed, improver.has_ended))
     return _with_best(result, improver)
 
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from cbrrt_ompl import Bounds, Box, Footprint, Goal, Robot, Scenario, State, World, plan
+from cbrrt_ompl import Bounds, Box, Footprint, Goal, Limits, Robot, Scenario, State, World, plan
 from cbrrt_ompl.collision.scene import Scene, footprint_center
+from cbrrt_ompl.optimise.anytime import robust_search
+from cbrrt_ompl.planners import search as search_module
 from cbrrt_ompl.planners.reachable import CLOSED, ReachableCells, reachable_cells, spread
 
 BAR = Footprint.polygon([(0.0, -0.2), (0.8, -0.2), (0.8, 0.2), (0.0, 0.2)])
@@ -89,3 +92,42 @@ def test_a_building_in_a_large_blocked_map_is_planned_in_as_if_it_were_alone() -
     found = [plan(s, "cb-rrt-robust", seed=2) for s in (whole, replace(whole, world=crop))]
     assert [result.status for result in found] == ["solved"] * 2
     assert found[0].samples < 5 * found[1].samples
+
+
+def test_a_search_again_is_that_of_its_seed() -> None:
+    """Though the cells that it draws from are those of the first search."""
+    scenario = Scenario(
+        name="building",
+        world=building(),
+        robot=Robot(footprint=Footprint.disc(0.3)),
+        start=State(3.0, 9.0),
+        goal=Goal(3.0, 3.0, tolerance=0.5),
+    )
+    first = robust_search(scenario, 2)
+    first.run(lambda _: False, 300)
+    before = first.edges()[0].copy()
+    again, fresh = first.again(5), robust_search(scenario, 5)
+    for search in (again, fresh):
+        search.run(lambda _: False, 300)
+    assert all(np.array_equal(a, b) for a, b in zip(again.edges(), fresh.edges(), strict=True))
+    assert len(again.edges()[0]) > 10
+    assert np.array_equal(first.edges()[0], before)
+
+
+def test_an_anytime_plan_looks_for_reachable_cells_once_a_direction(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = []
+
+    def counted(*arguments: Any) -> ReachableCells | None:
+        calls.append(arguments)
+        return reachable_cells(*arguments)
+
+    monkeypatch.setattr(search_module, "reachable_cells", counted)
+    for v_min, looks in ((0.0, 1), (-1.0, 2)):
+        calls.clear()
+        robot = Robot(Footprint.disc(0.3), Limits(v_min=v_min))
+        scenario = Scenario(
+            name="building", world=building(), robot=robot, start=State(3.0, 9.0), goal=Goal(3.0, 3.0, tolerance=0.5)
+        )
+        history = plan(scenario, "cb-rrt-anytime", seed=2, max_iterations=3000).history
+        assert len(history) > 1
+        assert len(calls) == looks

@@ -34,16 +34,18 @@ def robust_search(scenario: Scenario, seed: int) -> Search:
     return search_in(scenario, law_of(ROBUST, scenario.planning), seed, robust=True)
 
 
-def further_guesses(scenario: Scenario, seed: int, has_ended: Callable[[], bool]) -> Iterator[Guess]:
+def further_guesses(scenario: Scenario, search: Search, seed: int, has_ended: Callable[[], bool]) -> Iterator[Guess]:
     """Guesses after the first plan and the geodesic: by turns other ways, the plan of the mirrored robot, other seeds.
 
     Args:
         scenario: what to plan.
-        seed: of the first plan.
+        search: that made the first plan.
+        seed: of that.
         has_ended: whether to stop a search.
     """
     paths = [path for path in [geodesic(scenario)] if path is not None]
-    reverses = scenario.robot.limits.v_min < 0.0
+    limits, behind = scenario.robot.limits, None
+    reverses = limits.v_min < 0.0
     for number in range(1, ROUNDS + 1):
         if paths:
             path = geodesic(scenario, avoid=paths)
@@ -53,12 +55,14 @@ def further_guesses(scenario: Scenario, seed: int, has_ended: Callable[[], bool]
                 if reverses:
                     yield guess_along(path, scenario, BACKWARDS, f"way {number} backwards")
         if reverses:
-            trajectory = _plan(mirrored(scenario), seed + number, has_ended)
+            behind = robust_search(mirrored(scenario), seed + number) if behind is None else behind.again(seed + number)
+            trajectory = _plan(behind, has_ended)
             if trajectory is not None:
-                yield guess_from_trajectory(_turned_round(trajectory), scenario.robot.limits, f"mirrored plan {number}")
-        trajectory = _plan(scenario, seed + number, has_ended)
+                yield guess_from_trajectory(_turned_round(trajectory), limits, f"mirrored plan {number}")
+        search = search.again(seed + number)
+        trajectory = _plan(search, has_ended)
         if trajectory is not None:
-            yield guess_from_trajectory(trajectory, scenario.robot.limits, f"plan {number}")
+            yield guess_from_trajectory(trajectory, limits, f"plan {number}")
 
 
 def mirrored(scenario: Scenario) -> Scenario:
@@ -81,8 +85,7 @@ def _turned_round(trajectory: Trajectory) -> Trajectory:
     return replace(trajectory, theta=theta, v=-trajectory.v, v_command=-trajectory.v_command)
 
 
-def _plan(scenario: Scenario, seed: int, has_ended: Callable[[], bool]) -> Trajectory | None:
+def _plan(search: Search, has_ended: Callable[[], bool]) -> Trajectory | None:
     """A plan of CB-RRT, if a few samples make one."""
-    search = robust_search(scenario, seed)
     search.run(lambda _: has_ended(), SAMPLES)
     return search.trajectory() if search.has_reached_goal else None

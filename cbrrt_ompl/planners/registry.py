@@ -12,7 +12,7 @@ from enum import Enum
 from cbrrt_ompl.errors import UnknownPlannerError
 from cbrrt_ompl.motion.model import CLOSED_LOOP, OPEN_LOOP, STEERING
 from cbrrt_ompl.problem.robot import Gains, Limits, Robot, gains_for
-from cbrrt_ompl.problem.settings import FilledSettings, PlanningSettings
+from cbrrt_ompl.problem.settings import FOR_MAPS, FilledSettings, PlanningSettings
 from cbrrt_ompl.scenario.scenario import Scenario
 
 
@@ -69,9 +69,6 @@ class Planner:
         """A robot with this planner's default gains, where none are given."""
         return robot if robot.gains is not None else replace(robot, gains=self.default_gains(robot.limits))
 
-
-FOR_MAPS = FilledSettings(goal_bias=0.2, max_samples=500_000, closed_loop=True)
-"""Settings that suit a map."""
 
 _COMPILED, _PLUGIN, _OMPL = Backend.COMPILED, Backend.PLUGIN, Backend.OMPL
 _KANAYAMA, _RATES, _RANDOM = Steering.KANAYAMA, Steering.RATES, Steering.RANDOM

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from copy import copy
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,18 +79,29 @@ class Search:
                 are drawn only where the robot may get to.
         """
         self.model = model
-        self.has_reached_goal = False
-        self._scene, self._bounds = world.scene(footprint), world.bounds
-        self._rng = np.random.default_rng(seed)
+        self._scene, self._bounds, self._starts = world.scene(footprint), world.bounds, starts
+        self._goal_bias, self._neighbours, self._is_robust = goal_bias, neighbours, robust
         self._cells = reachable_cells(self._scene, starts) if robust else None
-        self._draws: NDArray[np.float64] = np.empty((0, ROBUST_DRAWS if robust else DRAWS))
         self._steps = record_array(1, STEPS)
+        self._plant(seed)
+
+    def again(self, seed: int) -> Search:
+        """A search like this one from another seed, before its first sample; what is known of the world is shared."""
+        other = copy(self)
+        other._plant(seed)
+        return other
+
+    def _plant(self, seed: int | None) -> None:
+        """Begin a tree of its own."""
+        self.has_reached_goal = False
+        self._rng = np.random.default_rng(seed)
+        self._draws: NDArray[np.float64] = np.empty((0, ROBUST_DRAWS if self._is_robust else DRAWS))
         self._search = record_array(1, SEARCH)
-        self._search["goal_bias"], self._search["is_robust"] = goal_bias, robust
-        capacity = max(FIRST_CAPACITY, 2 * len(starts))
+        self._search["goal_bias"], self._search["is_robust"] = self._goal_bias, self._is_robust
+        capacity = max(FIRST_CAPACITY, 2 * len(self._starts))
         self._tree = record_array(capacity, NODE)
-        self._index = make_index(KINDS[neighbours], self._bounds, capacity)
-        for number, start in enumerate(starts):
+        self._index = make_index(KINDS[self._neighbours], self._bounds, capacity)
+        for number, start in enumerate(self._starts):
             for name, value in zip(State._fields, start, strict=True):
                 self._tree[name][number] = value
             add_node(self._tree, self._index, number, -1)

@@ -254,3 +254,6 @@ MAX_SAMPLES = 1_000_000_000
 
 MAX_STEPS = 100_000
 """Steps that one extension may have: what a control duration and its buffers are made for."""
+
+FOR_MAPS = FilledSettings(goal_bias=0.2, max_samples=500_000, closed_loop=True)
+"""Settings that suit a map."""

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from cbrrt_ompl.problem.settings import FOR_MAPS
 from cbrrt_ompl.scenario.plain_yaml import dump_line
 
 WIDTH = 44
@@ -48,10 +49,10 @@ _MEANINGS = {
     "clearance": "distance to keep from everything [m]",
 }
 _MORE = (
-    ("horizon", 2.0, "duration of one extension [s]: about a room at full speed"),
-    ("closed_loop", True, "ask the control law at every step"),
-    ("goal_bias", 0.2, "fraction of the samples that are the goal"),
-    ("max_samples", 500000, "samples after which a plan has failed"),
+    ("horizon", FOR_MAPS.horizon, "duration of one extension [s]: about a room at full speed"),
+    ("closed_loop", FOR_MAPS.closed_loop, "ask the control law at every step"),
+    ("goal_bias", FOR_MAPS.goal_bias, "fraction of the samples that are the goal"),
+    ("max_samples", FOR_MAPS.max_samples, "samples after which a plan has failed"),
     ("brake_safe", True, "keep only what the robot can brake from"),
 )
 
