@@ -11,6 +11,7 @@ from cbrrt_ompl import Scenario, improve, load_scenario, plan
 from cbrrt_ompl.drive import DriveSettings, drive
 from cbrrt_ompl.drive.improving import on_whole_steps
 from cbrrt_ompl.errors import SettingsError
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 
 
 @pytest.fixture(scope="module")
@@ -47,3 +48,18 @@ def test_an_improved_trajectory_has_rows_at_whole_steps_and_ends_where_it_did(of
 def test_wrong_iterations_are_refused_by_name(steps: object) -> None:
     with pytest.raises(SettingsError, match="max_iterations: got .* expected a whole number of 0 or more"):
         DriveSettings(max_iterations=steps)  # type: ignore[arg-type]
+
+
+def test_a_last_step_that_became_longer_is_cut_in_two() -> None:
+    """Rows that follow a motion to a goal at speed may end a little after it, in a step longer than the others."""
+    t = np.linspace(0.0, 0.9998, 26)
+    v = 1.0 + 0.9 * np.sin(3.0 * t)
+    x = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))])
+    flat = np.zeros_like(t)
+    motion = Trajectory(t, x, flat, flat, v, flat, np.append(v[1:], v[-1]), flat)
+    assert motion.resampled(20.0).duration > 1.0 + 1e-6, "the last step is no longer than the others"
+    rows = on_whole_steps(motion, 0.05)
+    assert np.diff(rows.t) == pytest.approx(0.05)
+    assert rows.duration == pytest.approx(1.05)
+    assert rows.at(0.9998)[0, 0] == pytest.approx(x[-1], abs=5e-3)
+    assert rows.x[-1] == pytest.approx(x[-1] + v[-1] * (1.05 - 0.9998), abs=5e-3)

@@ -54,6 +54,8 @@ def improved(
 def on_whole_steps(trajectory: Trajectory, step: float) -> Trajectory:
     """A trajectory with rows a step apart; one that ends at speed drives on for what is left of its last step."""
     rows = trajectory.resampled(1.0 / step)
+    if len(rows) > 1 and rows.duration > step * (len(rows) - 1) + 1e-9:  # its last step may be longer: two of them
+        rows = _with_last_step_cut(rows, step)
     left = step * (len(rows) - 1) - rows.duration
     if left > 1e-9 and len(rows) > 1:
         x, y, theta, v, omega = rows.states[-1].tolist()
@@ -64,3 +66,17 @@ def on_whole_steps(trajectory: Trajectory, step: float) -> Trajectory:
         rows = replace(rows, t=times, x=states[:, 0], y=states[:, 1], theta=states[:, 2])
     assert math.isclose(rows.duration, step * (len(rows) - 1), abs_tol=1e-6)
     return rows
+
+
+def _with_last_step_cut(rows: Trajectory, step: float) -> Trajectory:
+    """Rows a step apart but for a longer last step, with one more row a step after the last but one."""
+    t = np.insert(rows.t, len(rows) - 1, rows.t[0] + step * (len(rows) - 1))
+    commands = np.column_stack([rows.v_command, rows.omega_command])
+    commands = np.concatenate([commands[:-1], commands[-2:]])
+    return replace(
+        rows,
+        t=t,
+        **dict(zip(("x", "y", "theta", "v", "omega"), rows.at(t).T, strict=True)),
+        v_command=commands[:, 0],
+        omega_command=commands[:, 1],
+    )

@@ -57,10 +57,9 @@ class UnseenSpace:
         """
         reach = self._reach
         square = shapely.intersection(shapely.box(x - reach, y - reach, x + reach, y + reach), self._inside)
-        unseen = shapely.union(shapely.intersection(self.region, square), shapely.difference(square, self._square))
+        still, new = shapely.intersection(self.region, square), shapely.difference(square, self._square)
         seen = shapely.make_valid(shapely.Polygon(view.outline(x, y, 1.5 * reach)))
-        parts = shapely.get_parts(shapely.difference(unseen, seen))
-        self.region = shapely.multipolygons(parts[shapely.area(parts) > SLIVER])
+        self.region = _areas(shapely.difference(shapely.union(_areas(still), _areas(new)), _areas(seen)))
         self._square = square
 
     def is_entered(
@@ -76,9 +75,16 @@ class UnseenSpace:
         """
         way = shapely.LineString(motion[:, :2]) if len(motion) > 1 else shapely.Point(motion[0, :2])
         near = shapely.intersection(self.region, shapely.buffer(way, footprint.circumscribed_radius + SLACK))
-        triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(shapely.set_precision(near, GRID)))
+        near = _areas(shapely.set_precision(_areas(near), GRID))
+        triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(near))
         if len(triangles) == 0 and not hidden:
             return False
         rings = [shapely.get_coordinates(ring)[:3] for ring in shapely.orient_polygons(triangles)]
         pieces = join((ring_pieces(rings), obstacle_pieces(hidden)))
         return not is_free(motion, dt, make_scene(self._bounds, pieces, footprint))
+
+
+def _areas(geometry: shapely.Geometry) -> shapely.MultiPolygon:
+    """The polygons in a geometry, without lines, points and slivers."""
+    parts = shapely.get_parts(shapely.get_parts(geometry))  # a collection may hold multipolygons
+    return shapely.multipolygons(parts[shapely.area(parts) > SLIVER])
