@@ -1,0 +1,237 @@
+"""What is run for the page of records: a campaign takes a folder of maps and yields runs of planners in problems.
+
+The folder has the subfolders dynobench, ros and barn: problems and models of github.com/quimortiz/dynobench, maps of
+github.com/ros-navigation/navigation2, worlds and paths of github.com/Daffan/the-barn-challenge. Nothing is downloaded.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+from barn import score, worlds_in
+from improve import ITERATIONS, grid_scenarios
+from lower_bound import shortest_duration
+from maps import map_scenarios
+
+from cbrrt_ompl import (
+    Bounds,
+    Box,
+    Footprint,
+    Goal,
+    Limits,
+    Robot,
+    Scenario,
+    State,
+    Trajectory,
+    World,
+    load_dynobench,
+    plan,
+    verify,
+)
+
+OURS = "cb-rrt-anytime"
+OMPLS = ("rrt", "kpiece1", "sst")
+OMPL_TIME = 10.0
+"""Time of a run of OMPL's planners [s]."""
+
+
+class Run(NamedTuple):
+    """One run; times and costs of runs that have failed count as infinite."""
+
+    seed: int
+    solved: bool
+    verified: bool
+    time: float
+    """CPU time until the first trajectory; of a drive, that of its longest cycle [s]."""
+    cost: float
+    """What the page tells of the problem: a duration [s], a ratio, or a score."""
+
+
+class Runs(NamedTuple):
+    """The runs of one planner in one problem."""
+
+    problem: str
+    """One word."""
+    planner: str
+    time_limit: float
+    """Of a run [s]."""
+    runs: list[Run]
+
+
+FAILED = Run(0, False, False, math.inf, math.inf)
+
+
+def best_after(scenario: Scenario, seed: int, budget: float, cost: Callable[[Trajectory], float]) -> Run:
+    """The best trajectory of the anytime planner after some CPU time [s]."""
+    found: list[float] = []
+    began = time.process_time()
+
+    def elapsed() -> float:
+        return time.process_time() - began
+
+    result = plan(
+        scenario,
+        OURS,
+        seed,
+        time_limit=10.0,
+        max_iterations=ITERATIONS,
+        callback=lambda _: found.append(elapsed()),
+        should_stop=lambda: elapsed() > budget,
+    )
+    if result.trajectory is None:
+        return FAILED._replace(seed=seed)
+    return Run(seed, True, verify(result.trajectory, scenario).ok, found[0], cost(result.trajectory))
+
+
+def first_of(scenario: Scenario, planner: str, seed: int, cost: Callable[[Trajectory], float]) -> Run:
+    """The first trajectory of a planner, within `OMPL_TIME` and with any number of samples."""
+    scenario = replace(scenario, planning=replace(scenario.planning, max_samples=10**9))
+    began = time.process_time()
+    result = plan(scenario, planner, seed, OMPL_TIME)
+    elapsed = time.process_time() - began
+    if result.trajectory is None:
+        return FAILED._replace(seed=seed)
+    return Run(seed, True, verify(result.trajectory, scenario).ok, elapsed, cost(result.trajectory))
+
+
+def compared(problem: str, scenario: Scenario, seeds: int) -> Iterator[Runs]:
+    """Ours for 200 ms, and the first trajectories of planners of OMPL's."""
+    best_after(scenario, 0, 0.05, duration)  # what is made once for a world
+    yield Runs(problem, OURS, 0.2, [best_after(scenario, seed, 0.2, duration) for seed in range(20)])
+    for planner in OMPLS:
+        plan(scenario, planner, 0, 0.01)
+        yield Runs(problem, planner, OMPL_TIME, [first_of(scenario, planner, seed, duration) for seed in range(seeds)])
+
+
+def duration(trajectory: Trajectory) -> float:
+    """What a trajectory costs, mostly [s]."""
+    return trajectory.duration
+
+
+def dynobench(data: Path, order: int) -> Iterator[Runs]:
+    """Unicycles, with the tolerance for optimisers."""
+    model = file_of(data, f"dynobench/unicycle{order}_v0.yaml")
+    for name in ("bugtrap", "kink", "parallelpark"):
+        problem = file_of(data, f"dynobench/{'' if order == 2 else 'unicycle1_'}{name}_0.yaml")
+        scenario = load_dynobench(problem, model, tolerance=0.03)
+        best_after(scenario, 0, 0.05, duration)
+        runs = [best_after(scenario, seed, 0.2, duration) for seed in range(20)]
+        yield Runs(f"unicycle{order}_{name}", OURS, 0.2, runs)
+
+
+def dynobench_for_samplers(data: Path) -> Iterator[Runs]:
+    """Unicycles of second order with the tolerance for samplers, planners of OMPL's among them."""
+    model = file_of(data, "dynobench/unicycle2_v0.yaml")
+    for name in ("bugtrap", "kink", "parallelpark"):
+        scenario = load_dynobench(file_of(data, f"dynobench/{name}_0.yaml"), model, tolerance=0.2)
+        yield from compared(f"unicycle2_{name}_wide", scenario, 5)
+
+
+def nav2(data: Path) -> Iterator[Runs]:
+    """A Jackal that arrives with a heading and at rest in Nav2's map of 100 m x 100 m, 10 % occupied."""
+    pairs = [pair for pair in grid_scenarios(file_of(data, "ros/100by100_10.yaml"), 30) if pair[1] > 1.0]
+    best_after(pairs[0][0], 0, 0.05, duration)
+    runs = [
+        best_after(scenario, seed, 0.15, lambda found, reference=reference: found.length / reference)
+        for seed, (scenario, reference) in enumerate(pairs)
+    ]
+    yield Runs("100by100_10", OURS, 0.15, runs)
+
+
+def ros_maps(data: Path) -> Iterator[Runs]:
+    """A TurtleBot3 Waffle Pi between random free poses of maps, against a lower bound on the duration."""
+    for name in ("ros/depot.yaml", "ros/tb3_sandbox.yaml", "ros/small_warehouse/map.yaml"):
+        pairs = [(s, shortest_duration(s)) for s in map_scenarios(file_of(data, name), 30)]
+        pairs = [(scenario, bound) for scenario, bound in pairs if bound > 0.0]
+        best_after(pairs[0][0], 0, 0.05, duration)
+        runs = [
+            best_after(scenario, seed, 0.1, lambda found, bound=bound: found.duration / bound)
+            for seed, (scenario, bound) in enumerate(pairs)
+        ]
+        yield Runs(name.removeprefix("ros/").removesuffix(".yaml").replace("/map", ""), OURS, 0.1, runs)
+
+
+def barn(data: Path) -> Iterator[Runs]:
+    """The BARN challenge's metric of one drive through each world; the number of a run is the world's."""
+    worlds = worlds_in(data / "barn") if (data / "barn").is_dir() else []
+    if not worlds:
+        raise FileNotFoundError("barn/world_N.world or world_N.csv, with path_N.npy")
+    runs = []
+    for world, path in worlds:
+        s = score(world, path, 0)
+        runs.append(Run(int(world.stem[6:]), s.reached, not s.collided, s.longest_cycle, s.metric))
+    yield Runs("BARN", "drive", math.inf, runs)
+
+
+def aisle(data: Path) -> Iterator[Runs]:
+    """From one aisle of 1.1 m into the next, around the end of the rack: a robot of 0.62 m x 0.9 m."""
+    yield from compared("aisle", aisle_scenario(), 5)
+
+
+def aisle_scenario() -> Scenario:
+    """Two aisles of 1.1 m, and one of 1.1 m between them; the robot's diagonal is 1.093 m."""
+    outline = [(-0.45, -0.31), (0.45, -0.31), (0.45, 0.31), (-0.45, 0.31)]
+    return Scenario(
+        name="aisle",
+        world=World(Bounds((0.0, 0.0), (8.0, 3.2)), [Box((0.0, 1.1), (6.9, 2.1))]),
+        robot=Robot(Footprint.polygon(outline), Limits(-0.3, 1.0, -1.0, 1.0, 0.6, 2.0)),
+        start=State(1.0, 0.55),
+        goal=Goal(1.0, 2.65, tolerance=0.2, theta=math.pi, heading_tolerance=0.1),
+    )
+
+
+def movingai(data: Path) -> Iterator[Runs]:
+    """City maps of the MovingAI benchmarks: a point robot's paths against the published lengths over the cells."""
+    found: Sequence[Path] = sorted((data / "movingai").glob("*.scen")) if (data / "movingai").is_dir() else ()
+    if not found:
+        raise FileNotFoundError("movingai/NAME.map.scen with NAME.map")
+    for scen in found:
+        yield Runs(scen.name.split(".")[0], OURS, 0.2, list(_movingai_runs(scen)))
+
+
+def _movingai_runs(scen: Path) -> Iterator[Run]:
+    """A run for each twentieth of the longest problems of a file; cells have a side of 1 m."""
+    from cbrrt_ompl import load_map
+
+    rows = [line.split("\t") for line in scen.read_text(encoding="utf-8").splitlines()[1:] if line.strip()]
+    world, height = load_map(scen.with_suffix("")).to_world(), int(rows[0][3])
+    robot = Robot(Footprint.disc(0.4), Limits(0.0, 2.0, -2.0, 2.0, 1.0, 4.0))
+    for seed, row in enumerate(rows[:: max(len(rows) // 20, 1)]):
+        (x0, y0, x1, y1), length = map(int, row[4:8]), float(row[8])
+        scenario = Scenario(
+            name=scen.stem,
+            world=world,
+            robot=robot,
+            start=State(x0 + 0.5, height - y0 - 0.5),
+            goal=Goal(x1 + 0.5, height - y1 - 0.5, tolerance=0.5),
+        )
+        yield best_after(scenario, seed, 0.2, lambda found, length=length: found.length / max(length, 1.0))
+
+
+def file_of(data: Path, name: str) -> Path:
+    """A file of the folder.
+
+    Raises:
+        FileNotFoundError: with its name, if it is not there.
+    """
+    if not (data / name).is_file():
+        raise FileNotFoundError(name)
+    return data / name
+
+
+CAMPAIGNS: dict[str, Callable[[Path], Iterator[Runs]]] = {
+    "dynobench2": lambda data: dynobench(data, 2),
+    "dynobench1": lambda data: dynobench(data, 1),
+    "samplers": dynobench_for_samplers,
+    "nav2": nav2,
+    "maps": ros_maps,
+    "aisle": aisle,
+    "barn": barn,
+    "movingai": movingai,
+}
+"""Campaigns by name."""
