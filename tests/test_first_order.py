@@ -143,6 +143,14 @@ def test_verify_holds_velocities_to_their_limits_and_poses_to_the_velocities() -
     assert "motion" in {violation.kind for violation in verify(moved, SCENARIO).violations}
 
 
+def test_a_file_that_forgot_to_be_kinematic_is_refused_with_the_hint(tmp_path: Path) -> None:
+    planned(SCENARIO).save(tmp_path / "plan.csv")
+    found = verify(Trajectory.load(tmp_path / "plan.csv"), SCENARIO)
+    assert not found.ok
+    assert "kinematic=True" in found.hint
+    assert verify(Trajectory.load(tmp_path / "plan.csv", kinematic=True), SCENARIO).ok
+
+
 def test_the_command_line_takes_a_file_as_kinematic_without_being_told(tmp_path: Path) -> None:
     save_scenario(SCENARIO, tmp_path / "gap.yaml")
     files = [str(tmp_path / "plan.csv"), str(tmp_path / "gap.yaml")]

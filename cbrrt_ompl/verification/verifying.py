@@ -104,17 +104,19 @@ def verify(
             "stored motion": Motion.through(trajectory.t, trajectory.poses, trajectory.step_velocities, reach),
             "motion computed again": Motion.through(trajectory.t, states[:, :3], velocities, reach),
         }
+        strayed = list(motion_violations(trajectory, states, tolerance))
         sweeps = {name: sweep(motion, distances, resolution, kept) for name, motion in motions.items()}
         violations = (
             *start_violations(trajectory, scenario),
             *limit_violations(trajectory, limits),
             *wheel_speed_violations(trajectory, limits),
             *accelerations,
-            *motion_violations(trajectory, states, tolerance),
+            *strayed,
             *collision_violations(sweeps, kept),
             *sampling_violations(trajectory.t, motions.values(), sweeps.values()),
             *goal_violations(trajectory, scenario),
         )
+        should_jump = bool(accelerations) or (limits.is_first_order and not trajectory.kinematic and bool(strayed))
         nearest = min(sweeps.values(), key=lambda sweep: sweep.smallest_margin)
         return Verification(
             violations=violations,
@@ -129,7 +131,7 @@ def verify(
             rows=len(trajectory),
             duration=trajectory.duration,
             checks=sum(sweep.checks for sweep in sweeps.values()),
-            hint=KINEMATIC_HINT if accelerations and _jumps_to_commands(trajectory) else "",
+            hint=KINEMATIC_HINT if should_jump and _jumps_to_commands(trajectory) else "",
         )
 
 
