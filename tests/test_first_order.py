@@ -177,6 +177,15 @@ def test_an_improved_trajectory_jumps_and_is_no_slower_than_the_way_at_full_spee
     assert way / 0.5 < better.duration < 1.3 * way / 0.5 + 2.0
 
 
+def test_to_arrive_at_rest_costs_one_step_alone() -> None:
+    """It took an interval of the solver before, in which the robot hardly moved."""
+    freely = replace(AT_REST, goal=replace(AT_REST.goal, speed_tolerance=None))
+    moving, standing = (improve(planned(scenario), scenario, max_iterations=600) for scenario in (freely, AT_REST))
+    assert standing.ends_at_rest
+    assert abs(standing.v[-2]) > 0.1
+    assert standing.duration <= moving.duration + AT_REST.planning.step
+
+
 def test_smoothness_is_measured_by_the_range_of_the_velocities() -> None:
     t = np.array([0.0, 1.0, 2.0])
     x = np.array([1.0, 1.5, 1.5])

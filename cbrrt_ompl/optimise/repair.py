@@ -106,10 +106,13 @@ def missing_margin(transcription: Transcription, trajectory: Trajectory, interva
 
 
 def by_interval(rows: NDArray[Any], intervals: int) -> NDArray[Any]:
-    """The largest value of the rows of each interval, its first and last included, shape (intervals,)."""
+    """The largest value of the rows of each interval, its first and last included, shape (intervals,).
+
+    What there is after the last interval, where the robot stands, does not count.
+    """
     parts = (len(rows) - 1) // intervals
-    inner = rows[:-1].reshape(intervals, parts).max(axis=1)
-    return np.maximum(inner, rows[parts::parts])
+    inner = rows[: intervals * parts].reshape(intervals, parts).max(axis=1)
+    return np.maximum(inner, rows[parts::parts][:intervals])
 
 
 def at_nodes(values: NDArray[Any]) -> NDArray[Any]:

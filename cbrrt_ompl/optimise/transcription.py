@@ -83,6 +83,8 @@ class Transcription:
         problem["is_kinematic"], problem["shortest_step"] = is_kinematic, SHORTEST_STEP
         self._problem, self._goal_theta = problem, scenario.goal.theta or 0.0
         fill_goal(problem, scenario.goal)
+        if is_kinematic:  # it stops on the spot, afterwards
+            problem["speed_tolerance"] = math.inf
         fill_weights(problem, objective, limits)
         self.margin = least_clearance(scenario) + SPARE_MARGIN
 
@@ -128,12 +130,16 @@ class Transcription:
     def trajectory(self, guess: Guess) -> Trajectory:
         """The motion that the controls of a solution lead to, integrated exactly from the scenario's start.
 
-        Its rows are evenly spaced, at most an integration step apart.
+        Its rows are evenly spaced, at most an integration step apart. A kinematic robot that is to arrive at rest
+        stands in one more step.
         """
         limits, h = self.scenario.robot.limits, float(guess.states[0, STEP])
         parts = min(max(1, math.ceil(h / self.scenario.planning.step - 1e-9)), MOST_ROWS)
         begin = np.array(self.scenario.start, dtype=float)
         states = roll_out(begin, guess.controls, h / parts, parts, limits, self.is_kinematic)
+        most = self.scenario.goal.speed_tolerance
+        if self.is_kinematic and most is not None and np.abs(states[-1, 3:]).max() > most:
+            states = np.concatenate([states, [[*states[-1, :3], 0.0, 0.0]]])
         commands = np.concatenate([states[1:, 3:], states[-1:, 3:]])
         t: NDArray[np.float64] = h / parts * np.arange(len(states), dtype=float)
         return Trajectory(t, *states.T, *commands.T, kinematic=self.is_kinematic, limits=limits)
