@@ -56,10 +56,10 @@ def run(arguments: argparse.Namespace) -> int:
     from cbrrt_ompl.planning import plan
     from cbrrt_ompl.scenario.sources import is_map
 
-    scenario = given_scenario(arguments)
     planner = arguments.planner or (map_planner() if is_map(arguments.scenario) else "cb-rrt")
     limits = {"improve_for": arguments.improve_for, "max_iterations": arguments.max_iterations}
-    warm_up(planner, improves=any(limit is not None for limit in limits.values()))
+    improves = any(limit is not None for limit in limits.values())
+    scenario = given_scenario(arguments, lambda: warm_up(planner, improves))
     with plan_progress(planner_named(planner).settings(scenario.planning).max_samples, planner) as progress:
         result = plan(scenario, planner, arguments.seed, arguments.time_limit, progress=progress, **limits)
     trajectory = result.trajectory

@@ -6,7 +6,7 @@ import argparse
 import math
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -69,15 +69,19 @@ def add_map_options(parser: argparse._ActionsContainer) -> None:
     parser.add_argument("--unknown", choices=("occupied", "free"), metavar="WHAT", help=text)
 
 
-def given_scenario(arguments: argparse.Namespace) -> Scenario:
+def given_scenario(arguments: argparse.Namespace, before_kernels: Callable[[], None]) -> Scenario:
     """The scenario of a command line, checked; remarks on its map go to stderr.
+
+    Args:
+        arguments: the command line.
+        before_kernels: called before anything is asked of compiled code.
 
     Raises:
         InputError: with every mistake in it.
     """
     from cbrrt_ompl.scenario.scenario import make_scenario
 
-    scenario = make_scenario(*given_source(arguments))
+    scenario = make_scenario(*given_source(arguments), before_kernels)
     print_remarks(scenario.map)
     return scenario
 

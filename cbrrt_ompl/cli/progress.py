@@ -8,6 +8,7 @@ import time
 import timeit
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from importlib import import_module
 from typing import Any
 
 LOOPS_OF_PLANNERS, LOOPS_OF_PLUGIN, LOOPS_OF_IMPROVEMENT = 7_000, 2_500, 5_000
@@ -30,6 +31,7 @@ def warm_up(planner: str | None, improves: bool = False) -> None:
         planner: its name; None for none.
         improves: whether trajectories are to be improved.
     """
+    _load_numba()
     from cbrrt_ompl import planning
 
     timer = threading.Timer(1.0, _tell_of_compilation, [planner, improves])
@@ -45,6 +47,17 @@ def warm_up(planner: str | None, improves: bool = False) -> None:
         timer.cancel()
 
 
+def _load_numba() -> None:
+    """Load numba without ``scipy.linalg``, which takes a sixth of a start: it wants BLAS for convolutions alone."""
+    if "scipy.linalg" in sys.modules:
+        return
+    sys.modules["scipy.linalg"] = None  # type: ignore[assignment]  # so that an import of it fails
+    try:
+        import_module("numba.np.arraymath")
+    finally:
+        del sys.modules["scipy.linalg"]
+
+
 def _tell_of_compilation(planner: str | None, improves: bool) -> None:
     """Say what is going on and, from the speed of this machine, about how long."""
     from cbrrt_ompl.benchmark.local import available_cores
@@ -56,7 +69,7 @@ def _tell_of_compilation(planner: str | None, improves: bool) -> None:
     if improves or (planner is not None and PLANNERS[planner].is_anytime):
         loops += LOOPS_OF_IMPROVEMENT
     share = SHARE_OF_TWO_CORES if available_cores() > 1 else 1.0
-    seconds = share * loops * min(timeit.repeat("sum(i * i for i in range(100_000))", number=1, repeat=3))
+    seconds = share * loops * min(timeit.repeat("sum(i * i for i in range(100_000))", number=1, repeat=10))
     about = f"about {max(5.0, 5.0 * round(seconds / 5.0)):.0f} s"
     print(f"cbrrt: compiling the planners, once after installation: {about} ...", file=sys.stderr, flush=True)
 

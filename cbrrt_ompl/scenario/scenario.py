@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -184,12 +184,13 @@ def find_problems(parts: Mapping[str, Any]) -> list[Problem]:
     return found
 
 
-def make_scenario(source: Source, report: Report) -> Scenario:
+def make_scenario(source: Source, report: Report, before_kernels: Callable[[], None] = lambda: None) -> Scenario:
     """Scenario from plain values.
 
     Args:
         source: what was read.
         report: with the mistakes of reading it.
+        before_kernels: called when all values are well, before anything is asked of compiled code.
 
     Raises:
         ScenarioError: with every mistake in the values and in what they add up to.
@@ -197,6 +198,7 @@ def make_scenario(source: Source, report: Report) -> Scenario:
     parts = read_checked(source, report)
     if report.problems:
         raise ScenarioError(report.problems, source.name)
+    before_kernels()
     return Scenario(**parts)
 
 
