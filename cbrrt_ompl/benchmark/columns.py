@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from cbrrt_ompl.scenario.scenario import Scenario
 from cbrrt_ompl.trajectory.trajectory import Trajectory
@@ -66,3 +67,22 @@ def trajectory_columns(trajectory: Trajectory | None, scenario: Scenario) -> dic
         repr(abs(float(trajectory.omega[-1]))),
     )
     return dict(zip(TRAJECTORY_COLUMNS, values, strict=True))
+
+
+PROGRESS_ROWS = 50
+"""Rows of progress in the time limit of a run, at equal distances: Planner Arena fits curves to them."""
+
+
+def progress_rows(solutions: Sequence[tuple[float, float]], end: float, interval: float) -> tuple[tuple[str, ...], ...]:
+    """The best cost so far, whenever it got better and at equal distances in between, as OMPL's planners report it.
+
+    Args:
+        solutions: time [s] and cost of each, better and better.
+        end: when the run was over [s].
+        interval: between the rows [s].
+    """
+    rows = dict(solutions)
+    for time, cost in rows.copy().items():
+        for i in range(math.ceil(time / interval), math.floor(end / interval) + 1):
+            rows[i * interval] = cost
+    return tuple((f"{time:.6f}", f"{rows[time]:.9g}") for time in sorted(rows))

@@ -8,7 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from cbrrt_ompl.benchmark.columns import search_columns, trajectory_columns
+from cbrrt_ompl.benchmark.account import describe_problem
+from cbrrt_ompl.benchmark.columns import PROGRESS_ROWS, progress_rows, search_columns, trajectory_columns
 from cbrrt_ompl.benchmark.entrant import Entrant
 from cbrrt_ompl.benchmark.log import Log, PlannerLog, Row, read_log
 from cbrrt_ompl.errors import InputError, Problem, SettingsError
@@ -86,10 +87,6 @@ class Experiment:
         for name in self.entrants:
             plan(self._scenario, name, seed=0, time_limit=WARM_UP)
         benchmark = ot.Benchmark(self._setup, self._name)
-        benchmark.addExperimentParameter("scenario", "VARCHAR(512)", self._scenario.name.replace(" = ", "="))
-        limits = {entrant.max_samples for entrant in self.entrants.values()}
-        if len(limits) == 1:
-            benchmark.addExperimentParameter("max_samples", "INTEGER", str(limits.pop()))
         for entrant in self.entrants.values():
             entrant.time_limit = time_limit
             benchmark.addPlanner(entrant)
@@ -133,7 +130,7 @@ class Experiment:
         for column, value in columns.items():
             run[column] = value
         if entrant.progress is not None:
-            rows = tuple((f"{row.time:.6f}", f"{row.cost:.9g}") for row in entrant.progress)
+            rows = progress_rows(entrant.progress, entrant.planning_time, entrant.time_limit / PROGRESS_ROWS)
             self._progress.setdefault(entrant.getName(), []).append(rows)
         self._run += 1
 
@@ -145,7 +142,9 @@ class Experiment:
 
     def _completed(self, log: Log) -> Log:
         """The log with what the entrants hide."""
-        setup = log.setup.partition(PROPERTIES)[0] + PROPERTIES + "".join(self._properties.values())
+        limits = {entrant.max_samples for entrant in self.entrants.values()}
+        head = describe_problem(self._scenario.name, limits.pop() if len(limits) == 1 else None)
+        setup = head + log.setup.partition(PROPERTIES)[0] + PROPERTIES + "".join(self._properties.values())
         return replace(log, setup=setup, planners=tuple(self._with_settings(planner) for planner in log.planners))
 
     def _with_settings(self, planner: PlannerLog) -> PlannerLog:
@@ -167,6 +166,10 @@ def check_entries(scenario: Scenario, seeds: Mapping[str, Sequence[int]]) -> Non
         planner_named(name)
     if len({len(runs) for runs in seeds.values()}) != 1 or not all(seeds.values()):
         raise InputError(Problem("seeds", {name: len(runs) for name, runs in seeds.items()}, "as many runs for all"))
-    if len({law_of(name, scenario.planning) == CLOSED_LOOP for name in seeds}) > 1:
-        expected = "planners of one kind: those in closed loop steer by references, the others by velocities"
+    closed = [name for name in seeds if law_of(name, scenario.planning) == CLOSED_LOOP]
+    if 0 < len(closed) < len(seeds):
+        expected = (
+            f"planners of one kind: the controls of {', '.join(closed)} are references, those of others velocities, "
+            "and an Experiment has one control space; set planning.closed_loop to False, or give each kind its own"
+        )
         raise SettingsError(Problem("planners", ", ".join(seeds), expected))

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cbrrt_ompl.benchmark.account import max_samples_of, name_of
 from cbrrt_ompl.benchmark.database import open_database, write_database
 from cbrrt_ompl.benchmark.log import read_log
 from cbrrt_ompl.errors import InputError, Problem
@@ -133,11 +134,12 @@ def _read_experiment(connection: sqlite3.Connection, row: dict[str, Any]) -> Exp
     name = re.sub(r"[^\w.-]+", "_", row["name"])  # names files
     if connection.execute("SELECT 1 FROM experiments WHERE name = ? AND id < ?", (row["name"], row["id"])).fetchone():
         name = f"{name}_{row['id']}"
+    account = row.get("setup") or ""
     return Experiment(
         name=name,
-        title=row.get("scenario") or row["name"],
+        title=name_of(account) or row.get("scenario") or row["name"],
         time_limit=row["timelimit"],
-        max_samples=row.get("max_samples"),
+        max_samples=max_samples_of(account) or row.get("max_samples"),  # of older versions: columns
         host=row["hostname"],
         date=row["date"],
         version=row["version"],
