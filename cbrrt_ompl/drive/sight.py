@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from cbrrt_ompl.collision.pieces import RECTANGLE, Pieces, obstacle_pieces
 from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.motion.records import Record, Records, record_array
-from cbrrt_ompl.problem.obstacles import Obstacle
+from cbrrt_ompl.problem.obstacles import Disc, Obstacle
 
 UNIFORM_RAYS = 720
 """Rays a look has besides those at the edges of what is near."""
@@ -126,6 +127,12 @@ class Sight:
         find_spans(self._shapes, self._corners, x, y, spans)
         is_near = spans["nearest"] <= reach
         return self._shapes[is_near], spans[is_near], self._owner[is_near]
+
+
+@cache
+def warm_up() -> None:
+    """Make the kernels ready that look, before a clock runs."""
+    Sight([Disc((1.0, 0.0), 0.1)]).look(0.0, 0.0, 2.0)
 
 
 def _shapes(parts: Pieces) -> tuple[Records, NDArray[np.float64]]:

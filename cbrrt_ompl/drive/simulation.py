@@ -24,6 +24,7 @@ from cbrrt_ompl.drive.improving import improved
 from cbrrt_ompl.drive.knowledge import Knowledge
 from cbrrt_ompl.drive.result import LATE, NO_ROOM, REACHED, STOPPED, UNSAFE, Cycle, DriveResult, Replan
 from cbrrt_ompl.drive.settings import DriveSettings, grown, hides_itself, needed_range
+from cbrrt_ompl.drive.sight import warm_up as warm_up_sight
 from cbrrt_ompl.errors import Problem, ScenarioError, SettingsError
 from cbrrt_ompl.planning import plan, warm_up_improvement, warm_up_planner
 from cbrrt_ompl.problem.obstacles import Obstacle
@@ -91,6 +92,8 @@ class Drive:
         warm_up_planner(self.settings.planner)
         if self.settings.max_iterations > 0:
             warm_up_improvement()
+        if self.settings.line_of_sight:
+            warm_up_sight()
         if not self._is_free_in(self.world, self._committed):
             expected = f"a state with {self.settings.margin:g} m of room (the margin), on the way to rest as well"
             raise ScenarioError(Problem("start", list(scenario.start), expected))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
@@ -17,11 +18,17 @@ def seen_until(result: DriveResult, look: int) -> set[int]:
 
 
 def view_at(result: DriveResult, t: float) -> NDArray[np.float64] | None:
-    """Outline of what is in line of sight at a time, shape (n, 2) [m]; None where obstacles hid nothing."""
+    """Outline of what is in line of sight at a time, within the bounds, shape (n, 2) [m].
+
+    None where obstacles hid nothing.
+    """
     if result.sight is None:
         return None
     x, y = result.trajectory.at(t)[0, :2].tolist()
-    return result.sight.look(x, y, result.settings.sensor_range).outline(x, y)
+    outline = shapely.Polygon(result.sight.look(x, y, result.settings.sensor_range).outline(x, y))
+    bounds = result.world.bounds
+    inside = shapely.get_parts(shapely.clip_by_rect(outline, *bounds.min, *bounds.max))
+    return shapely.get_coordinates(max(inside, key=shapely.area).exterior)[:-1]
 
 
 def plan_ahead(result: DriveResult, look: int, t: float) -> NDArray[np.float64]:

@@ -9,9 +9,12 @@ from functools import cache
 from numbers import Integral
 from typing import NamedTuple
 
+import numpy as np
+
 from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import Problem, SettingsError, TrajectoryError
+from cbrrt_ompl.optimise.clearance import clearances
 from cbrrt_ompl.optimise.guess import Guess, guess_from_trajectory, refined
 from cbrrt_ompl.optimise.guesses import AHEAD, BACKWARDS, geodesic, guess_along
 from cbrrt_ompl.optimise.objective import Objective
@@ -232,6 +235,7 @@ def warm_up() -> None:
     world = World(Bounds((0.0, 0.0), (2.0, 2.0)), [Box((0.0, 1.5), (0.2, 2.0)), Box((1.8, 1.5), (2.0, 2.0))])
     scenario = Scenario(name="warm up", world=world, start=State(0.5, 0.5), goal=Goal(1.5, 0.5, tolerance=0.1))
     Improver(scenario, Objective(room=0.1), max_iterations=40).run(geodesic_guesses(scenario))
+    clearances(np.array([scenario.start]), scenario)
 
 
 def _check_trajectory(trajectory: object, scenario: Scenario) -> None:

@@ -11,6 +11,7 @@ from cbrrt_ompl.motion.model import OPEN_LOOP, make_model
 from cbrrt_ompl.motion.records import record_array
 from cbrrt_ompl.planners.growth import grow
 from cbrrt_ompl.planners.nearest import GRID, make_index, nearest
+from cbrrt_ompl.planners.reachable import reachable_cells
 from cbrrt_ompl.planners.roll_out import STEPS, can_brake, free_steps
 from cbrrt_ompl.planners.search import FIRST_CAPACITY, Search
 from cbrrt_ompl.problem.robot import Footprint, Robot
@@ -26,6 +27,7 @@ def warm_up() -> None:
     with compiled_beside(__name__, "warm_up_roll_out", grow):
         nearest(make_index(GRID, world.bounds, FIRST_CAPACITY), 50.0, 50.0, 0, math.inf)
         search.tree()
+        reachable_cells(world.scene(Footprint.disc(0.5)), [State(50.0, 50.0)])
         free_steps(record_array(1, STEPS)[0], 0, 0.0, True, world.scene(Footprint.point()), model[0])
     search.run(lambda _: False, max_samples=2 * FIRST_CAPACITY)
     search.trajectory()
