@@ -65,9 +65,11 @@ most 0.5. One drive through each world of the challenge's own report (0, 6, ... 
 Published: the challenge's baseline, move_base with DWA (README of github.com/Daffan/the-barn-challenge). The same:
 worlds, start, goal, reference paths, metric. Not the same: the challenge simulates robot, lidar and delays, where
 here motion and sensor are exact; here the sensor reaches 5 m all around, obstacles hide what is behind them, and
-one seen in part is known as a whole; plans are limited by samples and not by the clock, so that a cycle of 0.1 s
-may take longer to compute; and AT begins with the first plan, not once the robot has moved 0.1 m, which makes it
-longer. The time is that of a drive's longest cycle (by the clock), and the metric the mean over the worlds."""
+one seen in part is known as a whole; and AT begins with the first plan, not once the robot has moved 0.1 m, which
+makes it longer. In BARN plans are limited by samples, the same on every machine, and a cycle of 0.1 s may take
+longer to compute; in BARN_by_the_clock what comes late is dropped, and the score depends on the machine, on which
+other work was going on. The time is that of a drive's longest cycle (by the clock), and the metric the mean over
+the worlds."""
 
 _AISLE = """A robot of 0.62 m x 0.9 m, with a diagonal of 1.093 m, drives from one aisle into the next around the
 end of a rack and arrives with a heading; all aisles are 1.1 m wide. Ours goes on for 200 ms; OMPL's planners, in
@@ -94,7 +96,7 @@ SECTIONS = (
         "duration [s]",
         {"unicycle1_bugtrap": "20.7 s", "unicycle1_kink": "13.2 s", "unicycle1_parallelpark": "3.1 s"},
     ),
-    Section("BARN", _BARN, "metric", {"BARN": "0.169"}, "mean"),
+    Section("BARN", _BARN, "metric", {"BARN": "0.169", "BARN_by_the_clock": "0.169"}, "mean"),
     Section(
         "Nav2's planner benchmark",
         _NAV2,
