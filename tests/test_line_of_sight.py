@@ -224,3 +224,21 @@ def test_one_seed_is_one_drive() -> None:
     assert first.trajectory == second.trajectory
     turned = OrientedBox((4.0, 3.0), (1.0, 1.0), 0.4)
     assert Sight([turned]).look(1.0, 3.0, 5.0).is_seen.tolist() == [True]
+
+
+def test_looks_from_nearly_one_place_do_not_add_corners_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A robot that crept past round things had a million of them after some seconds, and seconds a look."""
+    obstacles, (x, y) = random_scene(3)
+    sight, rng = Sight(obstacles), np.random.default_rng(0)
+    exact, coarse = UnseenSpace(HALL, 2.5), UnseenSpace(HALL, 2.5)
+    for _ in range(60):
+        view = sight.look(x, y, 2.5)
+        exact.look(x, y, view)
+        with monkeypatch.context() as few:
+            few.setattr("cbrrt_ompl.drive.unseen.MOST_CORNERS", 100)
+            coarse.look(x, y, view)
+        assert shapely.get_num_coordinates(coarse.region) <= 100
+        assert shapely.difference(exact.region, shapely.buffer(coarse.region, 1e-6)).area < 1e-5
+        x, y = x + rng.uniform(-1e-3, 1e-3), y + rng.uniform(-1e-3, 1e-3)
+    assert shapely.get_num_coordinates(exact.region) > 100
+    assert coarse.region.area < 1.2 * exact.region.area

@@ -21,6 +21,12 @@ GRID = 1e-4
 SLIVER = 1e-6
 """Area of unseen space that is too small to keep [m^2]."""
 
+MOST_CORNERS = 2_000
+"""Corners of the unseen space, beyond which it is made coarser: looks from nearly one place would add more and more."""
+
+COARSENESS = 0.002
+"""By how much the unseen space grows then, twice this at most [m]."""
+
 SLACK = 0.05
 """What is farther than this from a footprint all along a motion is not in its way [m]."""
 
@@ -59,7 +65,10 @@ class UnseenSpace:
         square = shapely.intersection(shapely.box(x - reach, y - reach, x + reach, y + reach), self._inside)
         still, new = shapely.intersection(self.region, square), shapely.difference(square, self._square)
         seen = shapely.make_valid(shapely.Polygon(view.outline(x, y, 1.5 * reach)))
-        self.region = _areas(shapely.difference(shapely.union(_areas(still), _areas(new)), _areas(seen)))
+        region = _areas(shapely.difference(shapely.union(_areas(still), _areas(new)), _areas(seen)))
+        self.region = (
+            region if shapely.get_num_coordinates(region) <= MOST_CORNERS else _areas(_coarser(region, square))
+        )
         self._square = square
 
     def is_entered(
@@ -82,6 +91,13 @@ class UnseenSpace:
         rings = [shapely.get_coordinates(ring)[:3] for ring in shapely.orient_polygons(triangles)]
         pieces = join((ring_pieces(rings), obstacle_pieces(hidden)))
         return not is_free(motion, dt, make_scene(self._bounds, pieces, footprint))
+
+
+def _coarser(region: shapely.Geometry, square: shapely.Geometry) -> shapely.Geometry:
+    """A region with fewer corners that holds all of another one, within a square; the square alone if that fails."""
+    wider = shapely.buffer(region, COARSENESS, join_style="mitre")
+    coarser = shapely.intersection(shapely.simplify(wider, COARSENESS), square)
+    return coarser if shapely.get_num_coordinates(coarser) <= MOST_CORNERS else square
 
 
 def _areas(geometry: shapely.Geometry) -> shapely.MultiPolygon:
