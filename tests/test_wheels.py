@@ -42,8 +42,9 @@ def rim(v: float, omega: float, limits: Limits) -> float:
 
 def inside(limits: Limits, v_share: float, omega_share: float) -> tuple[float, float]:
     """Velocities that the robot can have."""
-    v = limits.v_min + v_share * (limits.v_max - limits.v_min)
-    return saturate(v, limits.omega_min + omega_share * (limits.omega_max - limits.omega_min), limits)
+    v = min(limits.v_min + v_share * (limits.v_max - limits.v_min), limits.v_max)  # which rounding may exceed
+    omega = min(limits.omega_min + omega_share * (limits.omega_max - limits.omega_min), limits.omega_max)
+    return saturate(v, omega, limits)
 
 
 def hall(limits: Limits = SLOW_WHEELS, **changes: object) -> Scenario:
