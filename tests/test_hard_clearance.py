@@ -55,6 +55,14 @@ def test_a_start_within_the_clearance_is_refused_with_its_distance() -> None:
         replace(scenario(Footprint.point()), start=State(0.05, 2.0))
 
 
+def test_a_goal_within_the_clearance_is_refused_with_its_distance() -> None:
+    """All of the region is too near; it was searched for in vain."""
+    near = Goal(2.5, 0.8, tolerance=0.05)
+    with pytest.raises(ScenarioError, match=r"goal: .*a pose 0.2 m from everything .*; at its centre it is 0.1 m"):
+        replace(scenario(Footprint.disc(0.2), 0.2), goal=near)
+    assert replace(scenario(Footprint.disc(0.2), 0.12), goal=near).goal == near, "a part of the region is free"
+
+
 @pytest.mark.parametrize("wrong", [-0.1, float("nan"), "wide"])
 def test_what_is_no_distance_is_refused(wrong: object) -> None:
     with pytest.raises(SettingsError, match="planning.clearance"):

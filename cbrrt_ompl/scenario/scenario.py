@@ -174,11 +174,11 @@ def find_problems(parts: Mapping[str, Any]) -> list[Problem]:
     found = list(_name_problems(parts["name"])) if "name" in parts else []
     if robot is not None and world is not None:
         found += _footprint_problems(robot, world)
+    clearance = 0.0 if planning is None else planning.clearance
     if start is not None:
-        clearance = 0.0 if planning is None else planning.clearance
         found += _start_problems(start, world, robot, parts.get("map"), clearance)
     if goal is not None and world is not None:
-        found += _goal_problems(goal, world, robot, parts.get("map"))
+        found += _goal_problems(goal, world, robot, parts.get("map"), clearance)
     if planning is not None:
         found += _horizon_problems(planning)
     return found
@@ -195,16 +195,23 @@ def make_scenario(source: Source, report: Report, before_kernels: Callable[[], N
     Raises:
         ScenarioError: with every mistake in the values and in what they add up to.
     """
-    parts = read_checked(source, report)
+    parts = read_checked(source, report, before_kernels)
     if report.problems:
         raise ScenarioError(report.problems, source.name)
-    before_kernels()
     return Scenario(**parts)
 
 
-def read_checked(source: Source, report: Report) -> dict[str, Any]:
-    """Parts of a scenario as far as they can be read, and in the report every mistake in them and in their sum."""
+def read_checked(source: Source, report: Report, before_kernels: Callable[[], None] = lambda: None) -> dict[str, Any]:
+    """Parts of a scenario as far as they can be read, and in the report every mistake in them and in their sum.
+
+    Args:
+        source: what was read.
+        report: with the mistakes of reading it.
+        before_kernels: called when all values are well, before anything is asked of compiled code.
+    """
     parts = read_parts(source.data, source.folder, report)
+    if not report.problems:
+        before_kernels()
     if isinstance(source.data, Mapping):
         defaults = {"robot": Robot(), "planning": PlanningSettings()}
         report.adopt(find_problems({**{k: v for k, v in defaults.items() if k not in source.data}, **parts}))
@@ -282,7 +289,9 @@ def _velocity_problems(start: State, limits: Limits) -> Iterator[Problem]:
         yield Problem("start", {"v": start.v, "omega": start.omega}, expected)
 
 
-def _goal_problems(goal: Goal, world: World, robot: Robot | None, source: MapSource | None) -> Iterator[Problem]:
+def _goal_problems(
+    goal: Goal, world: World, robot: Robot | None, source: MapSource | None, clearance: float
+) -> Iterator[Problem]:
     """Why no state of the goal region can be reached."""
     if not world.bounds.contains(goal.x, goal.y):
         yield Problem("goal", [goal.x, goal.y], _inside(world))
@@ -290,16 +299,20 @@ def _goal_problems(goal: Goal, world: World, robot: Robot | None, source: MapSou
         reason = why_not(world, robot.footprint, (goal.x, goal.y, goal.theta or 0.0), source)
         expected = f"a region with room for the robot: all of it is in collision; at its centre {reason}"
         yield Problem("goal", [goal.x, goal.y], expected)
+    elif robot is not None and clearance > 0.0 and not _may_be_free(goal, world, robot, clearance):
+        found = world.clearance(robot.footprint, (goal.x, goal.y, goal.theta or 0.0))
+        expected = f"a region with a pose {clearance:g} m from everything (planning.clearance); at its centre it is"
+        yield Problem("goal", [goal.x, goal.y], f"{expected} {found:.4g} m")
 
 
-def _may_be_free(goal: Goal, world: World, robot: Robot) -> bool:
-    """Whether the goal region may hold a free position; False only where certainly none is."""
-    if world.clearance(robot.footprint, (goal.x, goal.y, goal.theta or 0.0)) > 0.0:
+def _may_be_free(goal: Goal, world: World, robot: Robot, room: float = 0.0) -> bool:
+    """Whether the goal region may hold a position with more room than so much; False only where certainly none is."""
+    if world.clearance(robot.footprint, (goal.x, goal.y, goal.theta or 0.0)) > room:
         return True  # asked first, since a plan needs the index of this footprint anyway
     radius = robot.footprint.inscribed_radius
     if radius == 0.0 and robot.footprint.vertices is not None:
         return True  # the robot's origin may stand in an obstacle that the footprint passes beside
-    return world.signed_clearance(goal.x, goal.y) + goal.tolerance > radius
+    return world.signed_clearance(goal.x, goal.y) + goal.tolerance > radius + room
 
 
 def _horizon_problems(planning: PlanningSettings) -> Iterator[Problem]:

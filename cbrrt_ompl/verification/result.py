@@ -65,7 +65,7 @@ class Verification:
             *([f"  hint: {self.hint}"] if self.hint else []),
             "checked:",
             *(f"  {line}" for line in self._checked()),
-            f"  no collision of the motion{again} at any time: by the clearance that FCL finds",
+            f"  no collision of the motion{again} at any time: by distances of GEOS",
             f"  at {self.checks} states and the way between them; "
             f"intervals of at most {self.resolution:g} m accepted for their free ends: {self.unproven}",
             f"smallest clearance: {self.smallest_clearance:.4g} m at t = {self.smallest_clearance_time:.6g} s, "
