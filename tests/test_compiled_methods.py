@@ -33,6 +33,9 @@ if has_ompl():
 else:
     pytest.skip("all of it needs OMPL", allow_module_level=True)
 
+UNLESS_OFF = pytest.mark.skipif(
+    os.environ.get("CBRRT_OMPL_COMPILED_METHODS") == "0", reason="CBRRT_OMPL_COMPILED_METHODS=0 switches them off"
+)
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the wheel hides the symbols")
 
 WORLD = World(Bounds((0.0, 0.0), (10.0, 10.0)), [Box((4.8, 0.0), (5.0, 6.0)), Box((2.0, 7.0), (3.0, 7.2))])
@@ -123,6 +126,7 @@ def test_this_wheel_passes_the_check() -> None:
     assert compiled_methods_work()
 
 
+@UNLESS_OFF
 def test_they_are_used_unless_switched_off(switch: Callable[[bool], None]) -> None:
     assert redirected(make_setup(EASY)) == [True] * 4
     assert redirected(make_setup(EASY, compiled=False)) == [False] * 4
@@ -211,6 +215,7 @@ FAKES: dict[str, tuple[Any, str, Any, str]] = {
 }
 
 
+@UNLESS_OFF
 @pytest.mark.parametrize("fake", FAKES)
 def test_another_wheel_falls_back_with_one_line(
     fake: str, unchecked: None, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
@@ -236,6 +241,7 @@ def test_without_sizes_of_symbols_it_falls_back(unchecked: None, monkeypatch: py
     assert not compiled_methods_work()
 
 
+@UNLESS_OFF
 def test_an_object_with_another_vtable_is_left_alone() -> None:
     space = make_state_space(WORLD, Robot())
     with pytest.raises(LayoutError, match="another vtable"):

@@ -207,6 +207,7 @@ def test_the_scenario_on_the_scenario_page_can_be_loaded(docs: Path, tmp_path: P
     assert len(load_scenario(path).world.obstacles) == 4
 
 
+@pytest.mark.needs_ompl
 def test_the_set_up_and_the_law_on_the_page_on_ompl_run(repository: Path, docs: Path, tmp_path: Path) -> None:
     whole = [
         block

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -133,7 +134,6 @@ def test_a_path_in_yaml_is_read_back(tmp_path: Path, trajectory: Trajectory) -> 
 def test_a_bag_without_the_library_says_what_to_install(
     tmp_path: Path, trajectory: Trajectory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import sys
 
     for name in [name for name in sys.modules if name.startswith("rosbags")] + ["rosbags", "rosbags.interfaces"]:
         monkeypatch.setitem(sys.modules, name, None)
@@ -206,3 +206,27 @@ def test_past_its_end_a_trajectory_at_rest_rests_and_another_says_how_to_brake()
     np.testing.assert_array_equal(slowing.at([1.0, 7.0]), np.repeat(slowing.states[-1:], 2, axis=0))
     with pytest.raises(TrajectoryError, match="times from 0 to 1 s"):
         slowing.at(-1.0)
+
+
+def test_the_command_line_writes_bags_and_paths(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    save_scenario(ROOM, "room.yaml")
+    command = ["plan", "room.yaml", "--planner", "cb-rrt-robust", "--seed", "1", "--trajectory"]
+    assert main([*command, "way.yaml"]) == 0
+    assert verify(load_track(tmp_path / "way.yaml"), ROOM, collisions_only=True).ok
+    pytest.importorskip("rosbags", reason="the extra ros is not installed")
+    assert main([*command, "way.mcap"]) == 0
+    assert "/map" in messages(tmp_path / "way.mcap")
+    capsys.readouterr()
+
+
+def test_a_bag_without_its_library_is_refused_before_any_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "rosbags.interfaces", None)
+    monkeypatch.setattr("cbrrt_ompl.planning.plan", lambda *_, **__: pytest.fail("planned"))
+    assert main(["plan", "office", "--trajectory", str(tmp_path / "way.mcap")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.endswith("expected the library rosbags: pip install 'cbrrt-ompl[ros]'")

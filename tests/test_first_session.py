@@ -115,6 +115,7 @@ def test_an_image_takes_its_resolution_from_the_command_line(room: Path, capsys:
     assert "resolution: missing, expected the side of a cell" in errors[0]
 
 
+@pytest.mark.needs_ompl
 def test_options_take_the_place_of_what_a_scenario_says(room: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (room / "tour.yaml").write_text(
         "name: tour\nmap: room.yaml\nrobot: jackal\nstart: {x: 2, y: 2, theta_deg: 20}\n"

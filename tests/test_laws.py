@@ -144,6 +144,7 @@ def test_an_exception_in_a_law_reaches_the_caller(planner: str, law: Any, expect
     assert plan(by("posq"), planner, seed=1).solved
 
 
+@pytest.mark.needs_ompl
 @pytest.mark.parametrize("compiled", [False, True])
 def test_a_law_steers_a_set_up_of_ompl(compiled: bool) -> None:
     setup = make_setup(by("posq"), "cb-rrt", compiled=compiled)
@@ -186,6 +187,7 @@ def test_a_law_that_no_process_can_import_is_refused_by_name() -> None:
     assert law_origin("posq") is None is law_origin("kanayama")
 
 
+@pytest.mark.needs_ompl
 @pytest.mark.slow
 def test_a_benchmark_knows_the_laws_of_the_script_that_runs_it(tmp_path: Path) -> None:
     script = tmp_path / "script.py"

@@ -85,7 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
     warm_up(arguments.planner)
     result = drive(scenario, hidden, settings, arguments.seed)
     if arguments.trajectory is not None:
-        result.trajectory.save(arguments.trajectory)
+        result.trajectory.save(arguments.trajectory, scenario)
     if arguments.figure is not None:
         from cbrrt_ompl.figures import draw_drive
         from cbrrt_ompl.figures.saving import save_figure

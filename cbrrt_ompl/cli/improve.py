@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     limits = {"time_limit": arguments.time_limit, "max_iterations": arguments.max_iterations}
     better = improve(given, scenario, **limits, callback=history.append)
     if arguments.output is not None:
-        better.save(arguments.output)
+        better.save(arguments.output, scenario)
     if arguments.figure is not None:
         from cbrrt_ompl.figures.improvement import draw_improvement
         from cbrrt_ompl.figures.saving import save_figure

@@ -10,8 +10,8 @@ from pathlib import Path
 from cbrrt_ompl.errors import InputError, Problem, Refusal
 
 SUFFIXES = {
-    "trajectory": (".csv", ".npz", ".json"),
-    "output": (".csv", ".npz", ".json"),
+    "trajectory": (".csv", ".npz", ".json", ".mcap", ".yaml"),
+    "output": (".csv", ".npz", ".json", ".mcap", ".yaml"),
     "figure": (".png", ".pdf", ".svg"),
     "animation": (".gif", ".html", ".mp4"),
     "database": (".db", ".sqlite", ".sqlite3"),
@@ -60,6 +60,10 @@ def check_output_files(arguments: argparse.Namespace, names: Iterable[str]) -> N
     problems = [problem for name, path in files.items() if (problem := _problem_with(name, path))]
     if problems:
         raise InputError(problems)
+    if any(path.suffix.lower() == ".mcap" for path in files.values()):
+        from cbrrt_ompl.export.ros_bag import check_rosbags
+
+        check_rosbags()
     if "figure" in files or "animation" in files:
         check_backend()
     if "animation" in files:

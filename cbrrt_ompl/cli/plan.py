@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
         result = plan(scenario, planner, arguments.seed, arguments.time_limit, progress=progress, **limits)
     trajectory = result.trajectory
     if arguments.trajectory is not None and trajectory is not None:
-        trajectory.save(arguments.trajectory)
+        trajectory.save(arguments.trajectory, scenario)
     if arguments.figure is not None:
         from cbrrt_ompl.figures import draw_plan
         from cbrrt_ompl.figures.saving import save_figure

@@ -82,13 +82,13 @@ def obstacle_pieces(obstacles: Sequence[Obstacle]) -> Pieces:
     polygons: dict[Polygon, None] = {}
     for obstacle in obstacles:
         if isinstance(obstacle, Box):
-            boxes[obstacle.min + obstacle.max] = None
+            boxes.setdefault(obstacle.min + obstacle.max)
         elif isinstance(obstacle, OrientedBox):
-            turned[(*obstacle.center, *obstacle.size, obstacle.angle)] = None
+            turned.setdefault((*obstacle.center, *obstacle.size, obstacle.angle))
         elif isinstance(obstacle, Disc):
-            discs[(*obstacle.center, obstacle.radius)] = None
+            discs.setdefault((*obstacle.center, obstacle.radius))
         else:
-            polygons[obstacle] = None
+            polygons.setdefault(obstacle)
     x0, y0, x1, y1 = np.array(list(boxes), dtype=float).reshape(-1, 4).T
     straight = _simple_pieces(RECTANGLE, 0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (x1 - x0), 0.5 * (y1 - y0))
     x, y, width, height, angle = np.array(list(turned), dtype=float).reshape(-1, 5).T

@@ -38,7 +38,8 @@ class Knowledge:
         self.hidden = list(hidden)
         boxes = [bounding_box(obstacle) for obstacle in hidden]
         self._boxes: NDArray[np.float64] = np.array(boxes, dtype=np.float64).reshape(-1, 4)
-        self._rows = len(world.obstacles) + np.arange(len(hidden))  # of the hidden ones among all
+        rows = np.arange(len(hidden), dtype=np.intp)
+        self._rows: NDArray[np.intp] = len(world.obstacles) + rows  # of the hidden ones among all
         self._sight = None if reach is None else Sight([*world.obstacles, *hidden])
         self._unseen = None if reach is None else UnseenSpace(world.bounds, reach)
 

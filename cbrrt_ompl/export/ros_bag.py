@@ -105,6 +105,15 @@ def read_track(path: Path, topic: str | None = None) -> Track:
     return stamped_track(np.array([s.sec + 1e-9 * s.nanosec for s in stamps]), poses)
 
 
+def check_rosbags() -> None:
+    """Find out whether bags can be written.
+
+    Raises:
+        TrajectoryError: if rosbags is not installed.
+    """
+    _rosbags()
+
+
 def _rosbags() -> SimpleNamespace:
     """The parts of rosbags that are used; it is no dependency, but an extra."""
     names = {
