@@ -27,6 +27,9 @@ LEAST_ROOM = 1.15
 SPACING = 0.1
 """Distance of the points of a path before it is smoothed [m]."""
 
+MOST_POINTS = 20_000
+"""Points of a smoothed path at most: they are farther apart along one of more than 2 km."""
+
 SMOOTHINGS = 10
 """Times that each point is replaced by a mean with its neighbours."""
 
@@ -122,7 +125,7 @@ def guess_along(path: NDArray[np.float64], scenario: Scenario, gear: int, source
 def smooth(path: NDArray[np.float64]) -> NDArray[np.float64]:
     """Points evenly along a path, its corners rounded off, shape (2, m)."""
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
-    places = np.linspace(0.0, along[-1], max(10, int(along[-1] / SPACING)))
+    places = np.linspace(0.0, along[-1], min(max(10, int(along[-1] / SPACING)), MOST_POINTS))
     points = np.array([np.interp(places, along, path[:, i]) for i in (0, 1)])
     for _ in range(SMOOTHINGS):
         points[:, 1:-1] = 0.25 * points[:, :-2] + 0.5 * points[:, 1:-1] + 0.25 * points[:, 2:]
