@@ -34,7 +34,7 @@ def sleep():
 @pytest.fixture
 def module(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     """A module of its own for each test, which numba keeps the kernels of beside it."""
-    monkeypatch.setattr(beside, "_cores", lambda: 2)
+    monkeypatch.setattr(beside, "available_cores", lambda: 2)
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     name = f"module_of_{request.node.name}"
     (tmp_path / f"{name}.py").write_text(MODULE, encoding="utf-8")
@@ -60,7 +60,7 @@ def test_there_is_no_second_process_where_it_would_not_help(
     module: ModuleType, monkeypatch: pytest.MonkeyPatch, reason: str
 ) -> None:
     if reason == "one core":
-        monkeypatch.setattr(beside, "_cores", lambda: 1)
+        monkeypatch.setattr(beside, "available_cores", lambda: 1)
     elif reason == "embedded":
         monkeypatch.setattr("sys.executable", "/usr/bin/blender")
     else:

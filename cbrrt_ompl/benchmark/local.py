@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import threading
 from collections.abc import Iterator, Sequence
@@ -10,11 +9,6 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from typing import Any
 
 from cbrrt_ompl.benchmark.job import J, Outcome, execute
-
-
-def available_cores() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0))
 
 
 def run_locally(waiting: Sequence[J], jobs: int = 1, patience: float | None = None) -> Iterator[tuple[J, Outcome]]:

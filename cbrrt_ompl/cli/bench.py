@@ -57,8 +57,9 @@ def run(arguments: argparse.Namespace) -> int:
     check_output_files(arguments, ["database"])
     from cbrrt_ompl.benchmark.campaign import Campaign, load_scenarios, run_campaign
     from cbrrt_ompl.benchmark.cluster import run_on_cluster
-    from cbrrt_ompl.benchmark.local import available_cores, run_locally
+    from cbrrt_ompl.benchmark.local import run_locally
     from cbrrt_ompl.planners.registry import PLANNERS
+    from cbrrt_ompl.processes import available_cores
 
     planners = list(dict.fromkeys(arguments.planner or PLANNERS))
     scenarios = load_scenarios(arguments.scenarios)

@@ -60,8 +60,8 @@ def _load_numba() -> None:
 
 def _tell_of_compilation(planner: str | None, improves: bool) -> None:
     """Say what is going on and, from the speed of this machine, about how long."""
-    from cbrrt_ompl.benchmark.local import available_cores
     from cbrrt_ompl.planners.registry import PLANNERS, is_compiled
+    from cbrrt_ompl.processes import available_cores
 
     loops = 0 if planner is None else LOOPS_OF_PLANNERS
     if planner is not None and not is_compiled(planner):

@@ -10,6 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from cbrrt_ompl.processes import available_cores
+
 _IS_BESIDE = "CBRRT_OMPL_COMPILES_BESIDE"
 """In the environment of the second process: it starts no third one."""
 
@@ -39,7 +41,7 @@ def compiled_beside(module: str, function: str, kernel: Any) -> Iterator[None]:
         kernel: one of them; where it has been compiled before, all have.
     """
     is_python = Path(sys.executable or "").name.startswith("python")
-    if os.environ.get(_IS_BESIDE) or not is_python or len(_running) + 1 >= _cores() or not _is_missing(kernel):
+    if os.environ.get(_IS_BESIDE) or not is_python or len(_running) + 1 >= available_cores() or not _is_missing(kernel):
         yield
         return
     try:
@@ -68,11 +70,6 @@ def _start(module: str, function: str) -> subprocess.Popen[bytes]:
         env={**os.environ, _IS_BESIDE: "1"},
         start_new_session=True,  # Ctrl-C is for the first process
     )
-
-
-def _cores() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _is_missing(kernel: Any) -> bool:

@@ -6,7 +6,7 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from cbrrt_ompl.benchmark.local import available_cores
+from cbrrt_ompl.processes import available_cores
 
 PACKAGES = ("cbrrt-ompl", "ompl", "python-fcl", "numpy", "numba", "scipy")
 

@@ -10,11 +10,12 @@ from functools import partial
 from pathlib import Path
 
 from cbrrt_ompl.benchmark.job import Runner
-from cbrrt_ompl.benchmark.local import available_cores, run_locally
+from cbrrt_ompl.benchmark.local import run_locally
 from cbrrt_ompl.errors import Problem, SettingsError
 from cbrrt_ompl.files import locked, write_file, write_files
 from cbrrt_ompl.ompl_plugin.availability import check_ompl
 from cbrrt_ompl.planners.nearest import KINDS
+from cbrrt_ompl.processes import available_cores
 from cbrrt_ompl.reproduce.grids import CELLS, PLACES, RULES, GridStudy, study_grids
 from cbrrt_ompl.reproduce.machine import machine, versions
 from cbrrt_ompl.reproduce.measuring import runs_of
