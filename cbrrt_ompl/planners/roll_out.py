@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cbrrt_ompl.collision.clearance import ENOUGH, clearance
 from cbrrt_ompl.collision.motion_check import check_step_motion, lever_arm, way_of_step
@@ -25,6 +26,7 @@ from cbrrt_ompl.motion.kinematics import (
 from cbrrt_ompl.motion.manoeuvres import BRAKE, is_manoeuvre, most_steps
 from cbrrt_ompl.motion.model import CLOSED_LOOP, advance, in_goal, manoeuvre_has_ended
 from cbrrt_ompl.motion.records import Record
+from cbrrt_ompl.problem.robot import Limits
 
 MOTION_FREE, MOTION_BLOCKED = 0, 1
 """Outcomes of a motion."""
@@ -35,17 +37,54 @@ BLOCK = 48
 SHORT_BLOCK = 8
 """The same near an obstacle, where the first steps may well be refused."""
 
+STRIDE = 8
+"""Steps that a margin is to prove at once, where their velocities only rise or only fall."""
+
 NEAR = 0.2
 """Margin below which the first block is a short one [m]."""
 
 STEPS = np.dtype(
     [
+        *((name, np.float64, (BLOCK,)) for name in ("dx", "dy")),  # way of each step [m]
         *((name, np.float64, (BLOCK + 1,)) for name in ("x", "y", "theta", "v", "omega")),  # at the ends of the steps
-        *((name, np.float64, (BLOCK,)) for name in ("middle", "dx", "dy")),  # heading half-way [rad], way [m]
     ],
     align=True,
 )
-"""Room for the states of a block, the first of them before its first step."""
+"""Room for the states of a block, the first of them before its first step.
+
+What a loop writes comes before what it reads: where LLVM cannot rule out that a read meets an earlier write, it halves
+the width of the vectors.
+"""
+
+
+@kernel(forceinline=True)
+def ramp_along(values: NDArray[np.float64], command: float, faster: float, slower: float, count: int) -> None:
+    """Velocities at the ends of some steps, from the first of them to a command; see :func:`ramp`."""
+    i = 0
+    while i < count and values[i] != command:
+        values[i + 1] = ramp(values[i], command, faster, slower)
+        i += 1
+    for k in range(i, count):
+        values[k + 1] = command
+
+
+@kernel(forceinline=True)
+def ramp_jointly(
+    vs: NDArray[np.float64],
+    omegas: NDArray[np.float64],
+    v_command: float,
+    omega_command: float,
+    count: int,
+    limits: Limits,
+    dt: float,
+) -> None:
+    """Both velocities at the ends of some steps, as of a robot with wheel limits; see :func:`joint_ramp`."""
+    i = 0
+    while i < count and not (vs[i] == v_command and omegas[i] == omega_command):
+        vs[i + 1], omegas[i + 1] = joint_ramp(vs[i], omegas[i], v_command, omega_command, limits, dt)
+        i += 1
+    for k in range(i, count):
+        vs[k + 1], omegas[k + 1] = v_command, omega_command
 
 
 @kernel(forceinline=True)  # else LLVM may leave it a call, which makes an extension a tenth slower
@@ -63,31 +102,23 @@ def integrate_block(steps: Record, v_command: float, omega_command: float, count
     """
     dt, limits = model.dt, model.limits
     xs, ys, thetas, vs, omegas = steps.x, steps.y, steps.theta, steps.v, steps.omega
-    middles, dxs, dys = steps.middle, steps.dx, steps.dy
+    dxs, dys = steps.dx, steps.dy
     v_command, omega_command = saturate(v_command, omega_command, limits)
     if model.jumps:
         vs[0], omegas[0] = v_command, omega_command
-    theta, v, omega = thetas[0], vs[0], omegas[0]
     if has_wheel_limits(limits):
-        for i in range(count):
-            v, omega_next = joint_ramp(v, omega, v_command, omega_command, limits, dt)
-            middles[i] = middle_heading(theta, omega, omega_next, dt)
-            theta = wrap_angle(theta + 0.5 * (omega + omega_next) * dt)
-            omega = omega_next
-            vs[i + 1], omegas[i + 1], thetas[i + 1] = v, omega, theta
+        ramp_jointly(vs, omegas, v_command, omega_command, count, limits, dt)
     else:
         slower, turns_slower = decelerations(limits)
-        faster, turns_faster = limits.acceleration * dt, limits.angular_acceleration * dt
-        slower, turns_slower = slower * dt, turns_slower * dt
-        for i in range(count):
-            v = ramp(v, v_command, faster, slower)
-            omega_next = ramp(omega, omega_command, turns_faster, turns_slower)
-            middles[i] = middle_heading(theta, omega, omega_next, dt)
-            theta = wrap_angle(theta + 0.5 * (omega + omega_next) * dt)
-            omega = omega_next
-            vs[i + 1], omegas[i + 1], thetas[i + 1] = v, omega, theta
+        ramp_along(vs, v_command, limits.acceleration * dt, slower * dt, count)
+        ramp_along(omegas, omega_command, limits.angular_acceleration * dt, turns_slower * dt, count)
+    theta = thetas[0]
     for i in range(count):
-        dxs[i], dys[i] = displacement(middles[i], vs[i], omegas[i], vs[i + 1], omegas[i + 1], dt)
+        theta = wrap_angle(theta + 0.5 * (omegas[i] + omegas[i + 1]) * dt)
+        thetas[i + 1] = theta
+    for i in range(count):
+        middle = middle_heading(thetas[i], omegas[i], omegas[i + 1], dt)
+        dxs[i], dys[i] = displacement(middle, vs[i], omegas[i], vs[i + 1], omegas[i + 1], dt)
     x, y = xs[0], ys[0]
     for i in range(count):
         x, y = x + dxs[i], y + dys[i]
@@ -140,13 +171,14 @@ def first_in_goal(steps: Record, count: int, goal: Record) -> int:
 
 @kernel
 def free_steps(
-    steps: Record, count: int, margin: float, any_heading: bool, scene: Scene, model: Record
+    steps: Record, count: int, is_monotonic: bool, margin: float, any_heading: bool, scene: Scene, model: Record
 ) -> tuple[int, float, bool]:
     """How many steps of a block are free, one after the other.
 
     Args:
         steps: a record of type `STEPS`.
         count: how many there are.
+        is_monotonic: whether each velocity only rises or only falls in them, so that a margin proves many at once.
         margin: distance proven free before the first of them, beyond the model's room [m].
         any_heading: see :func:`cbrrt_ompl.collision.motion_check.lever_arm`.
         scene: world and footprint.
@@ -156,7 +188,14 @@ def free_steps(
         The number, and the margin and its ``any_heading`` after the last free one.
     """
     dt, room, frame = model.dt, model.room, scene.frame[0]
-    for i in range(count):
+    i = 0
+    while i < count:
+        ahead = min(i + STRIDE, count)
+        way = (ahead - i) * way_of_step(state_at(steps, i), state_at(steps, ahead), lever_arm(frame, any_heading), dt)
+        if is_monotonic and margin >= way:
+            margin -= way
+            i = ahead
+            continue
         start, end = state_at(steps, i), state_at(steps, i + 1)
         if model.jumps:
             start = (start[0], start[1], start[2], end[3], end[4])
@@ -167,6 +206,7 @@ def free_steps(
             margin, any_heading = check_step_motion(start, end, margin, any_heading, scene, room, dt)
             if margin <= 0.0:
                 return i, margin, any_heading
+        i += 1
     return count, margin, any_heading
 
 
@@ -214,14 +254,15 @@ def roll_out(
     size = SHORT_BLOCK if margin < NEAR else BLOCK
     while left > 0:
         count, is_over = min(size, left), False
-        if is_manoeuvring or model.law == CLOSED_LOOP:
+        is_stepwise = is_manoeuvring or model.law == CLOSED_LOOP
+        if is_stepwise:
             count, is_over = integrate_stepwise(steps, control, count, model)
         else:
             integrate_block(steps, control[0], control[1], count, model)
         if not is_manoeuvring:
             goal_at = first_in_goal(steps, count, model.goal)
             count, is_over = min(count, goal_at), goal_at <= count
-        free, margin, any_heading = free_steps(steps, count, margin, any_heading, scene, model)
+        free, margin, any_heading = free_steps(steps, count, not is_stepwise, margin, any_heading, scene, model)
         driven += free
         if free < count:
             return driven, MOTION_BLOCKED, state_at(steps, free)

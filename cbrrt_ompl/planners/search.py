@@ -41,7 +41,7 @@ DRAWS_AT_ONCE = 4096
 PAUSE = 0.002
 """Aim for the time between two looks at the clock [s]."""
 
-FIRST_CAPACITY = 256
+FIRST_CAPACITY = 1024
 """Nodes that a search has room for at first; doubled when full."""
 
 

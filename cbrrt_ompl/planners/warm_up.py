@@ -28,7 +28,7 @@ def warm_up() -> None:
         nearest(make_index(GRID, world.bounds, FIRST_CAPACITY), 50.0, 50.0, 0, math.inf)
         search.tree()
         reachable_cells(world.scene(Footprint.disc(0.5)), [State(50.0, 50.0)])
-        free_steps(record_array(1, STEPS)[0], 0, 0.0, True, world.scene(Footprint.point()), model[0])
+        free_steps(record_array(1, STEPS)[0], 0, True, 0.0, True, world.scene(Footprint.point()), model[0])
     search.run(lambda _: False, max_samples=2 * FIRST_CAPACITY)
     search.trajectory()
 
