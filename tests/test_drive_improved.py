@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cbrrt_ompl import Scenario, improve, load_scenario, plan
-from cbrrt_ompl.drive import DriveSettings, drive
+from cbrrt_ompl import PlanResult, Scenario, improve, load_scenario, plan
+from cbrrt_ompl.drive import DriveSettings, drive, simulation
 from cbrrt_ompl.drive.improving import on_whole_steps
 from cbrrt_ompl.errors import SettingsError
 from cbrrt_ompl.trajectory.trajectory import Trajectory
@@ -28,6 +28,43 @@ def test_a_drive_with_improved_plans_is_shorter_safe_and_repeats_itself(office: 
     assert better[0].smallest_clearance >= better[0].settings.margin
     assert better[0].trajectory.duration < 0.8 * plain.trajectory.duration
     assert better[0].trajectory == better[1].trajectory
+
+
+def test_an_improvement_that_was_cut_short_goes_on_in_the_next_cycles(office: Scenario) -> None:
+    """Until it comes to its end: then no cycle takes the plan up again."""
+    settings = DriveSettings(sensor_range=30.0, max_samples=2000, max_iterations=40)
+    result = drive(office, [], settings, seed=1)
+    statuses = [replan.status for replan in result.replans]
+    assert statuses[0] == "solved" and set(statuses[1:]) == {"improved"}
+    assert len(statuses) < 0.5 * len(result.cycles)
+    assert len(result.searches) == len(result.planning_times) == 1
+    assert result.reached and result.verification.ok
+    arrivals = [replan.start_time + replan.trajectory.duration for replan in result.replans if replan.trajectory]
+    assert arrivals == sorted(arrivals, reverse=True)
+    assert arrivals[-1] < 0.9 * arrivals[0]
+
+
+def test_a_plan_is_driven_where_its_improvement_is_late(office: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = [0.0]
+    monkeypatch.setattr(simulation.time, "perf_counter", lambda: clock[0])
+
+    def late(found: Trajectory, *_: object) -> tuple[Trajectory, bool]:
+        clock[0] += 1.0
+        return found.resampled(20.0), False
+
+    monkeypatch.setattr(simulation, "improved", late)
+    made = []
+
+    def planned(scenario: Scenario, *_: object) -> PlanResult:
+        made.append(plan(scenario, "cb-rrt-robust", seed=1))
+        return made[-1]
+
+    monkeypatch.setattr(simulation, "plan", planned)
+    result = drive(office, [], DriveSettings(sensor_range=30.0, max_iterations=600), seed=1)
+    assert result.reached and len(made) == 1
+    assert [replan.status for replan in result.replans] == ["solved"]
+    taken = result.replans[0].trajectory
+    assert taken is not None and np.array_equal(taken.states, made[0].trajectory.states)
 
 
 def test_an_improved_trajectory_has_rows_at_whole_steps_and_ends_where_it_did(office: Scenario) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -20,8 +21,8 @@ SLACK = 5e-3
 
 def improved(
     plan: Trajectory, scenario: Scenario, max_iterations: int, time_limit: float, last: Trajectory | None
-) -> Trajectory:
-    """A plan made shorter, with rows at whole integration steps; itself where nothing shorter is found.
+) -> tuple[Trajectory, bool]:
+    """A plan made shorter, with rows at whole integration steps.
 
     Whether it is free is for the caller to check.
 
@@ -31,24 +32,28 @@ def improved(
         max_iterations: Newton steps at most.
         time_limit: time at most [s].
         last: what is left of the plan before, as another guess (a warm start); None where there is none.
+
+    Returns:
+        The plan, the one given where nothing shorter is found; and whether time or steps were used up before the end.
     """
-    planning = scenario.planning
+    began, planning = time.perf_counter(), scenario.planning
     here = scenario.world.clearance(scenario.robot.footprint, scenario.start[:3])
     try:
         room = replace(planning, clearance=max(planning.clearance, min(planning.clearance + SLACK, here - 1e-6)))
         roomy = replace(scenario, planning=room)
     except ScenarioError:
-        return plan
-    improver = Improver(roomy, Objective(), time_limit, max_iterations)
+        return plan, False
     limits = scenario.robot.limits
     guesses = [guess_from_trajectory(plan, limits, "plan"), *geodesic_guesses(roomy)]
     if last is not None and last.duration > 0.0:
         guesses.append(guess_from_trajectory(last, limits, "last plan"))
+    improver = Improver(roomy, Objective(), began + time_limit - time.perf_counter(), max_iterations)
     improver.run(guesses)
+    is_cut_short = improver.has_ended()
     if improver.best is None:
-        return plan
+        return plan, is_cut_short
     found = on_whole_steps(improver.best, planning.step)
-    return found if found.duration < plan.duration else plan
+    return (found if found.duration < plan.duration else plan), is_cut_short
 
 
 def on_whole_steps(trajectory: Trajectory, step: float) -> Trajectory:

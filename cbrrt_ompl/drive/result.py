@@ -26,6 +26,9 @@ REACHED, STOPPED = "reached", "stopped"
 LATE, UNSAFE, NO_ROOM = "late", "unsafe", "no room"
 """Why a plan was not taken, besides the reasons of a planner."""
 
+IMPROVED = "improved"
+"""Status of a plan that comes of the one before and not of a search."""
+
 
 @dataclass(frozen=True, eq=False)
 class Replan:
@@ -38,8 +41,9 @@ class Replan:
     start_time: float
     """When the robot is there [s]."""
     status: str
-    """``solved``, ``time limit``, ``sample limit``, ``late`` (solved when its time was over), ``unsafe`` (its first
-    cycle cannot be braked from) or ``no room`` (what is known covers the goal)."""
+    """``solved``, ``improved`` (what was left of the plan before, made shorter), ``time limit``, ``sample limit``,
+    ``late`` (solved when its time was over), ``unsafe`` (its first cycle cannot be braked from) or ``no room`` (what is
+    known covers the goal)."""
     samples: int
     """Samples drawn."""
     planning_time: float
@@ -96,9 +100,14 @@ class DriveResult:
         return [cycle.replan for cycle in self.cycles if cycle.replan is not None]
 
     @property
+    def searches(self) -> list[Replan]:
+        """The plans that a search was made for: all but those improved on the way."""
+        return [replan for replan in self.replans if replan.status != IMPROVED]
+
+    @property
     def planning_times(self) -> NDArray[np.float64]:
         """Times of the searches, shape (n,) [s]."""
-        return np.array([replan.planning_time for replan in self.replans])
+        return np.array([replan.planning_time for replan in self.searches])
 
     @property
     def computing_times(self) -> NDArray[np.float64]:
@@ -117,7 +126,7 @@ class DriveResult:
             return ""
         last, robot = self.trajectory.states[-1], self.scenario.robot
         nearest = nearest_thing(self.world, robot.footprint, last[:3].tolist(), len(self.scenario.world.obstacles))
-        statuses = [replan.status for replan in self.replans]
+        statuses = [replan.status for replan in self.searches]
         searched = f"; the last search ended by {statuses[-1]}" if statuses and statuses[-1] != SOLVED else ""
         here = State(*last.tolist())
         closed = "; there is no way on for this footprint"

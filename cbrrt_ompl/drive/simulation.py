@@ -22,7 +22,7 @@ from cbrrt_ompl.collision.motion_check import is_free
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.drive.improving import improved
 from cbrrt_ompl.drive.knowledge import Knowledge
-from cbrrt_ompl.drive.result import LATE, NO_ROOM, REACHED, STOPPED, UNSAFE, Cycle, DriveResult, Replan
+from cbrrt_ompl.drive.result import IMPROVED, LATE, NO_ROOM, REACHED, STOPPED, UNSAFE, Cycle, DriveResult, Replan
 from cbrrt_ompl.drive.settings import DriveSettings, grown, hides_itself, needed_range
 from cbrrt_ompl.drive.sight import warm_up as warm_up_sight
 from cbrrt_ompl.errors import Problem, ScenarioError, SettingsError
@@ -32,8 +32,8 @@ from cbrrt_ompl.problem.settings import State
 from cbrrt_ompl.scenario.scenario import Scenario
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 
-SEARCH_SHARE = 0.9
-"""Share of the time that is left in which the search has to end; the rest is for checking what it found."""
+COMPUTING_SHARE = 0.9
+"""Share of the time that is left in which a search or an improvement has to end; the rest is for checking its plan."""
 
 SHORTEST_SEARCH = 1e-3
 """Time that every search gets [s]."""
@@ -86,6 +86,7 @@ class Drive:
         self._last: Trajectory | None = None  # the plan before, from the next look on
         self._plan: Trajectory | None = None  # the rest of it from now on; None while braking
         self._committed = self._driven[0].stopping_at(0.0, self._robot.limits, self._dt)
+        self._is_cut_short = False  # whether the plan's improvement was
         self._failures = 0
         self.status = None if scenario.goal.violations(scenario.start) else REACHED
         self.cycles: list[Cycle] = []
@@ -155,7 +156,9 @@ class Drive:
             self.status = REACHED
         else:
             is_ready = not is_over and self._continue_plan(bool(seen))
-            if not is_ready and not is_over:
+            if is_ready and self._is_cut_short:
+                replan = self._improve_on(State(*piece.states[-1].tolist()), looked_at, began)
+            elif not is_ready and not is_over:
                 replan = self._replan(State(*piece.states[-1].tolist()), looked_at, portions, began)
                 is_ready = replan.trajectory is not None
             if not is_ready:
@@ -186,38 +189,69 @@ class Drive:
 
     def _replan(self, start: State, looked_at: float, portions: int, began: float) -> Replan:
         """Plan from where the robot is to be when the plan is ready, and commit to it if it is safe."""
-        settings, knowledge = self.settings, self._knowledge
-        limit, planning = portions * settings.cycle, self._planning
+        settings, limit = self.settings, portions * self.settings.cycle
         seed = int(self._rng.integers(2**31))
-        if settings.max_samples is None:
-            search_limit = max(SEARCH_SHARE * (limit - time.perf_counter() + began), SHORTEST_SEARCH)
-        else:
-            search_limit = math.inf
-            planning = replace(planning, max_samples=portions * settings.max_samples)
         record = partial(Replan, looked_at, start, looked_at + limit)
+        scenario = self._scenario_from(start, portions)
+        if scenario is None:
+            return record(NO_ROOM, 0, 0.0, None)
+        result = plan(scenario, settings.planner, seed, self._time_left(limit, began))
+        status, found, taken = result.status, result.trajectory, None
+        if found is not None and self._is_late(limit, began):
+            status, found = LATE, None
+        if found is not None:
+            taken = found if self._commit(found) else None
+            if settings.max_iterations > 0:
+                taken = self._improve(found, scenario, limit, began) or taken
+            status = UNSAFE if taken is None else status
+        shown = None if taken is None else replace(taken, t=taken.t + looked_at + limit)
+        return record(status, result.samples, result.planning_time, shown)
+
+    def _improve_on(self, start: State, looked_at: float, began: float) -> Replan | None:
+        """Make what is left of the plan shorter, where its improvement was cut short; None where that fails."""
+        limit, rest = self.settings.cycle, self._plan
+        scenario = self._scenario_from(start, 1)
+        if scenario is None or rest is None:
+            return None
+        taken = self._improve(rest, scenario, limit, began)
+        if taken is None:
+            return None
+        return Replan(
+            looked_at, start, looked_at + limit, IMPROVED, 0, 0.0, replace(taken, t=taken.t + looked_at + limit)
+        )
+
+    def _improve(self, found: Trajectory, scenario: Scenario, limit: float, began: float) -> Trajectory | None:
+        """Commit to a plan made shorter, with what is left of the plan before as a guess; None where that fails."""
+        last = self._last if self._last is not None and len(self._last) > 1 else None
+        better, self._is_cut_short = improved(
+            found, scenario, self.settings.max_iterations, self._time_left(limit, began), last
+        )
+        if better is found or not self._is_free(better) or self._is_late(limit, began) or not self._commit(better):
+            return None
+        return better
+
+    def _scenario_from(self, start: State, portions: int) -> Scenario | None:
+        """What to plan for in the world as it is known; None where that covers the start or the goal."""
+        knowledge, planning = self._knowledge, self._planning
+        if self.settings.max_samples is not None:
+            planning = replace(planning, max_samples=portions * self.settings.max_samples)
         if planning.clearance > 0.0:  # from where the robot is nearer to something, it must not get nearer still
             here = knowledge.world.clearance(self._robot.footprint, start[:3])
             planning = replace(planning, clearance=min(planning.clearance, here))
         try:
-            scenario = replace(self.scenario, world=knowledge.world, robot=self._robot, start=start, planning=planning)
+            return replace(self.scenario, world=knowledge.world, robot=self._robot, start=start, planning=planning)
         except ScenarioError:
-            return record(NO_ROOM, 0, 0.0, None)
-        result = plan(scenario, settings.planner, seed, search_limit)
-        status, found = result.status, result.trajectory
-        if found is not None and settings.max_iterations > 0:
-            found = self._improved(found, scenario, search_limit - result.planning_time)
-        if found is not None and settings.max_samples is None and time.perf_counter() - began > limit:
-            status, found = LATE, None
-        if found is not None and not self._commit(found):
-            status, found = UNSAFE, None
-        shown = None if found is None else replace(found, t=found.t + looked_at + limit)
-        return record(status, result.samples, result.planning_time, shown)
+            return None
 
-    def _improved(self, found: Trajectory, scenario: Scenario, time_limit: float) -> Trajectory:
-        """A plan made shorter, if that is free; what is left of the plan before is one of the guesses."""
-        last = self._last if self._last is not None and len(self._last) > 1 else None
-        better = improved(found, scenario, self.settings.max_iterations, max(time_limit, SHORTEST_SEARCH), last)
-        return better if self._is_free(better) else found
+    def _time_left(self, limit: float, began: float) -> float:
+        """Time that a search or an improvement may take [s]; infinite where samples and Newton steps limit it."""
+        if self.settings.max_samples is not None:
+            return math.inf
+        return max(COMPUTING_SHARE * (limit - time.perf_counter() + began), SHORTEST_SEARCH)
+
+    def _is_late(self, limit: float, began: float) -> bool:
+        """Whether the time is over in which a plan has to be ready."""
+        return self.settings.max_samples is None and time.perf_counter() - began > limit
 
     def _commit(self, rest: Trajectory) -> bool:
         """Follow a plan from the next look on, if its first cycle and the braking after that are free and seen."""

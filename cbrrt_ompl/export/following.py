@@ -106,7 +106,7 @@ class Follower:
         self.limits, self.step = limits, 1.0 / rate
         self._law: Law = KanayamaLaw() if law is None else law
         self.time = float(trajectory.t[0])
-        self._last = trajectory.states[0, 3:].copy()
+        self._last: tuple[float, float] = (float(trajectory.v[0]), float(trajectory.omega[0]))
 
     def command(self, pose: ArrayLike) -> tuple[float, float]:
         """The command until the next call, a step later.
@@ -118,17 +118,17 @@ class Follower:
             v and omega [m/s, rad/s]; after the end of the trajectory the robot is braked.
         """
         if self.is_done:
-            wanted: NDArray[np.float64] = np.zeros(2)
+            wanted = (0.0, 0.0)
         else:
             end = float(self.trajectory.t[-1])
             reference, ahead = self.trajectory.at([self.time, min(self.time + self.step, end)])
             error = error_of(pose, reference[:3])
-            wanted = np.array(self._law(error, float(ahead[3]), float(ahead[4])))
+            wanted = self._law(error, float(ahead[3]), float(ahead[4]))
             lag = float(error[0]) * math.copysign(1.0, ahead[3])
             pace = min(max(1.0 - lag / LONGEST_LAG, 0.0), 1.0) if ahead[3] else 1.0
             self.time = min(self.time + self.step * pace, end)
-        self._last = bounded(self._last, wanted, self.step, self.limits)
-        return float(self._last[0]), float(self._last[1])
+        self._last = self.limits.reachable(self._last, wanted, self.step)
+        return self._last
 
     @property
     def is_done(self) -> bool:
@@ -142,30 +142,6 @@ def error_of(pose: ArrayLike, reference: ArrayLike) -> NDArray[np.float64]:
     dx, dy, turn = np.asarray(reference, dtype=float) - (x, y, theta)
     c, s = math.cos(theta), math.sin(theta)
     return np.array([c * dx + s * dy, -s * dx + c * dy, float(wrapped(turn))])
-
-
-def bounded(old: NDArray[np.float64], new: NDArray[np.float64], dt: float, limits: Limits) -> NDArray[np.float64]:
-    """A command as near to a new one as the limits allow after an old one, shape (2,).
-
-    Args:
-        old: the command before, shape (2,) [m/s, rad/s].
-        new: what is wanted, shape (2,).
-        dt: time between them [s].
-        limits: limits of the robot.
-    """
-    new = np.clip(new, [limits.v_min, limits.omega_min], [limits.v_max, limits.omega_max])
-    half = 0.5 * limits.wheel_separation
-    rim = abs(new[0]) + half * abs(new[1])
-    if rim > limits.wheel_speed:
-        new = new * (limits.wheel_speed / rim)
-    change = new - old
-    within = limits.bounded_change(old, change, dt)
-    if not limits.has_wheel_limits:
-        return np.where(within == change, new, old + within)
-    rim_change = abs(change[0]) + half * abs(change[1])
-    fractions = [dt * limits.wheel_acceleration / rim_change] if rim_change > dt * limits.wheel_acceleration else [1.0]
-    fractions += [part / whole for part, whole in zip(within, change, strict=True) if part != whole]
-    return new if min(fractions) == 1.0 else old + change * min(fractions)
 
 
 class Disturbance(NamedTuple):
@@ -270,7 +246,8 @@ def _driven(
     dt = follower.step / _SUBSTEPS
     pose, velocity = state[:3], state[3:]
     for _ in range(_SUBSTEPS):
-        after = bounded(velocity, command, dt, follower.limits)
+        reached = follower.limits.reachable(velocity.tolist(), command.tolist(), dt)
+        after: NDArray[np.float64] = np.array(reached)
         before = after if follower.limits.is_first_order else velocity
         (v0, w0), (v1, w1) = before * kept, after * kept
         pose = pose + displacement(*(np.array([value]) for value in (pose[2], v0, v1, w0, w1, dt)))[0]

@@ -129,11 +129,11 @@ def draw_computing_times(ax: Axes, result: DriveResult) -> Axes:
     ax.axhline(limit, color="black", linestyle="--", linewidth=0.9, label="cycle time")
     ax.plot(times, computing, color=COMMAND_COLOR, linewidth=0.8, label="all computing")
     for is_taken, marker, color, label in ((True, "o", PATH_COLOR, "plan"), (False, "X", TREE_COLOR, "no plan")):
-        replans = [replan for replan in result.replans if (replan.trajectory is not None) == is_taken]
-        if replans:
+        searches = [search for search in result.searches if (search.trajectory is not None) == is_taken]
+        if searches:
             ax.plot(
-                [replan.time for replan in replans],
-                [1e3 * max(replan.planning_time, 1e-5) for replan in replans],
+                [search.time for search in searches],
+                [1e3 * max(search.planning_time, 1e-5) for search in searches],
                 linestyle="none",
                 marker=marker,
                 markersize=4.5,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -63,18 +64,37 @@ class Limits(NamedTuple):
         """Whether nothing limits the accelerations, so that the velocities jump."""
         return self.acceleration == math.inf
 
-    def bounded_change(self, velocity: ArrayLike, change: ArrayLike, duration: float) -> NDArray[np.float64]:
-        """A change of both velocities cut to what the accelerations allow, each by itself.
+    def saturated(self, v: float, omega: float) -> tuple[float, float]:
+        """Velocities cut to their ranges, then both scaled to what the wheels can do [m/s, rad/s]."""
+        v, omega = min(max(v, self.v_min), self.v_max), min(max(omega, self.omega_min), self.omega_max)
+        rim = abs(v) + 0.5 * self.wheel_separation * abs(omega)
+        share = self.wheel_speed / rim if rim > self.wheel_speed else 1.0
+        return v * share, omega * share
+
+    def reachable(self, old: Sequence[float], wanted: Sequence[float], duration: float) -> tuple[float, float]:
+        """Velocities as near to wanted ones as the limits allow some time after old ones.
+
+        Where a wheel limits the robot, both change by the same share of what is wanted, else each by itself.
 
         Args:
-            velocity: v and omega before it, shape (2,) [m/s, rad/s].
-            change: what is wanted, shape (2,).
-            duration: time for it, in which the velocities are linear [s].
+            old: v and omega before [m/s, rad/s].
+            wanted: v and omega asked for.
+            duration: time for the change, in which the velocities are linear [s].
         """
+        new = self.saturated(*wanted)
         rates = zip((self.acceleration, self.angular_acceleration), decelerations(self), strict=True)
-        steps = zip(np.asarray(velocity, dtype=float), rates, strict=True)
-        bounds = np.array([velocity_changes(v, up * duration, down * duration) for v, (up, down) in steps])  # (2, 2)
-        return np.clip(change, -bounds[:, 0], bounds[:, 1])
+        within = tuple(
+            _reachable(before, after, faster * duration, slower * duration)
+            for before, after, (faster, slower) in zip(old, new, rates, strict=True)
+        )
+        if not self.has_wheel_limits:
+            return within[0], within[1]
+        changes = (new[0] - old[0], new[1] - old[1])
+        rim = abs(changes[0]) + 0.5 * self.wheel_separation * abs(changes[1])
+        shares = [min(1.0, self.wheel_acceleration * duration / rim) if rim > 0.0 else 1.0]
+        shares += [(w - o) / c for w, o, n, c in zip(within, old, new, changes, strict=True) if w != n]
+        share = min(shares)
+        return new if share == 1.0 else (old[0] + share * changes[0], old[1] + share * changes[1])
 
     def problems(self) -> list[Problem]:
         """What is wrong with these limits, one entry a mistake."""
@@ -135,6 +155,14 @@ def velocity_changes(velocity: float, faster: float, slower: float) -> tuple[flo
     size = abs(velocity)
     back = slower if slower <= size else max(size, min(faster, slower))
     return (back, faster) if velocity > 0.0 else (faster, back)
+
+
+def _reachable(velocity: float, wanted: float, faster: float, slower: float) -> float:
+    """The velocity nearest to a wanted one that a step can lead to; see :func:`velocity_changes`."""
+    fall, rise = velocity_changes(velocity, faster, slower)
+    if -fall <= wanted - velocity <= rise:
+        return wanted
+    return velocity + rise if wanted > velocity else velocity - fall
 
 
 class Gains(NamedTuple):

@@ -41,8 +41,8 @@ STANDING_SPEED = 1e-6
 SMALLEST_POINT_TURN = math.radians(1.0)
 """Turns on the spot up to this are none [rad]."""
 
-_NODES, _WEIGHTS = ((1.0 + np.polynomial.legendre.leggauss(8)[0]) / 2.0, np.polynomial.legendre.leggauss(8)[1] / 2.0)
-"""Gauss-Legendre rule on [0, 1], exact for polynomials of degree 15."""
+QUADRATURE = np.transpose(np.polynomial.legendre.leggauss(8)) * 0.5 + (0.5, 0.0)
+"""Gauss-Legendre rule on [0, 1], exact for polynomials of degree 15: rows of (node, weight), shape (8, 2)."""
 
 
 class PointTurn(NamedTuple):
@@ -368,9 +368,9 @@ def displacement(
     Returns:
         Changes of (x, y, theta), not wrapped, shape (n, 3) [m, m, rad].
     """
-    share = _NODES[:, None]
+    share, weight = QUADRATURE.T[:, :, None]
     heading = theta + dt * share * (omega + 0.5 * (omega_end - omega) * share)  # (8, n)
-    way = dt * _WEIGHTS[:, None] * (v + (v_end - v) * share)  # (8, n)
+    way = dt * weight * (v + (v_end - v) * share)  # (8, n)
     turn = dt * 0.5 * (omega + omega_end)
     return np.column_stack([(way * np.cos(heading)).sum(axis=0), (way * np.sin(heading)).sum(axis=0), turn])
 
