@@ -12,11 +12,11 @@ from cbrrt_ompl.optimise.program import OMEGA, STEP, THETA, V
 from cbrrt_ompl.problem.robot import Limits
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 
-INTERVAL = 0.4
+INTERVAL = 0.55
 """Duration of an interval of a guess at most, as far as the number of intervals allows [s]."""
 
-TURN = 0.7
-"""Turn in an interval at most, for the same [rad]: the rule that integrates it is then good to 1e-5 of the path."""
+TURN = 1.0
+"""Turn in an interval at most, for the same [rad]: the rule that integrates it is then good to 3e-4 of its way."""
 
 FEWEST, MOST = 45, 300
 """Range of the number of intervals."""

@@ -22,7 +22,7 @@ ROUNDS = 6
 SOLVED_TO = 1e-3
 """Violation of a constraint up to which a solution is worth rolling out."""
 
-FIRST_BARRIER, WARM_BARRIER = 0.1, 1e-3
+FIRST_BARRIER, WARM_BARRIER = 0.03, 1e-3
 """Barrier parameters to start with: from a guess, and from a solution with other margins."""
 
 TARGET = 0.001
