@@ -428,9 +428,9 @@ def test_equipping_another_planner_takes_the_directed_sampler_away(planner: str,
     setup = make_setup(replace(EASY, goal=Goal(8.0, 8.0, tolerance=1e-9)), "cb-rrt")
     solve(setup, 10)
     assert sampler_calls.pop(KanayamaDirectedControlSampler) == 10
-    si = setup.getSpaceInformation()
-    equip(si, EASY, planner)
-    setup.setPlanner(make_planner(si, EASY, planner))
+    si, by_velocities = setup.getSpaceInformation(), replace(EASY, planning=PlanningSettings(closed_loop=False))
+    equip(si, by_velocities, planner)
+    setup.setPlanner(make_planner(si, by_velocities, planner))
     solve(setup, 100)
     assert sampler_calls == {}
 

@@ -28,6 +28,7 @@ from cbrrt_ompl import (
 )
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import SettingsError, TrajectoryError
+from cbrrt_ompl.motion.model import CLOSED_LOOP
 from cbrrt_ompl.ompl_plugin.availability import has_ompl
 from cbrrt_ompl.planners.registry import PLANNERS, Backend
 from cbrrt_ompl.problem.obstacles import Bounds, Box
@@ -37,6 +38,7 @@ from cbrrt_ompl.scenario.scenario import Scenario
 
 if has_ompl():
     from cbrrt_ompl.ompl_plugin.binding import ob, oc, ou
+    from cbrrt_ompl.ompl_plugin.setup import make_planner
 else:
     pytest.skip("all of it needs OMPL", allow_module_level=True)
 
@@ -210,6 +212,16 @@ def test_a_new_start_is_started_from(planner: str, clears: bool) -> None:
     assert dense_states(setup)[0][:2] == (0.0, 4.0)
 
 
+@pytest.mark.parametrize("planner", MOST)
+def test_a_start_with_a_heading_out_of_bounds_is_no_start(planner: str) -> None:
+    """OMPL's headings are below pi; the compiled planners wrapped it, and began elsewhere than they were told."""
+    setup = make_setup(OPEN, planner)
+    start = scoped(setup, -4.0, 0.0)
+    start()[1].value = math.pi
+    setup.setStartState(start)
+    assert solve(setup, 100) == "Invalid start"
+
+
 # goals
 
 
@@ -340,6 +352,29 @@ def test_a_step_that_is_too_long_for_the_robot_is_refused(planner: str) -> None:
         setup.setup()
 
 
+@pytest.mark.parametrize("step", [math.nan, math.inf, 1e-12])
+@pytest.mark.parametrize("planner", OURS)
+def test_a_step_that_is_no_time_is_refused(planner: str, step: float) -> None:
+    """OMPL lets NaN pass; our planners drove by another step, and called paths exact whose durations were NaN."""
+    setup = make_setup(OPEN, planner)
+    setup.getSpaceInformation().setPropagationStepSize(step)
+    with pytest.raises(
+        SettingsError, match=f"^{planner}: propagation step size: got {step}, expected a number above 0.*$"
+    ):
+        setup.setup()
+
+
+@pytest.mark.parametrize("durations", [(30, 5), (0, 5), (1, 2**31 - 1)])
+@pytest.mark.parametrize("planner", OURS)
+def test_durations_that_are_no_range_are_refused(planner: str, durations: tuple[int, int]) -> None:
+    """OMPL looks at them in the first set-up alone; two thousand million steps could not be interrupted."""
+    setup = make_setup(OPEN, planner)
+    setup.setup()
+    setup.getSpaceInformation().setMinMaxControlDuration(*durations)
+    with pytest.raises((SettingsError, RuntimeError), match="control durations: got|number of steps"):
+        solve(setup, 10)
+
+
 def bounds(*pairs: tuple[float, float]) -> Any:
     made = ob.RealVectorBounds(len(pairs))
     for i, (low, high) in enumerate(pairs):
@@ -366,6 +401,69 @@ def test_other_bounds_of_velocities_and_controls_are_refused_by_name(planner: st
         change(setup)
         with pytest.raises(SettingsError, match=f"{planner}: bounds .*scenario.robot.limits.*rrt"):
             setup.setup()
+
+
+@pytest.mark.parametrize("planner", OURS)
+def test_other_bounds_of_references_are_refused_by_name(planner: str) -> None:
+    """In closed loop, bounds of the control space were ignored."""
+    if PLANNERS[planner].law(PlanningSettings(closed_loop=True)) != CLOSED_LOOP:
+        pytest.skip("no closed loop")
+    setup = make_setup(replace(OPEN, planning=PlanningSettings(closed_loop=True)), planner)
+    setup.getControlSpace().setBounds(bounds((0.0, 1.0), (0.0, 1.0), (-1.0, 1.0)))
+    with pytest.raises(SettingsError, match=f"{planner}: bounds of the control space: .*those of the world.*rrt"):
+        setup.setup()
+
+
+@pytest.mark.parametrize("planner", ["syclop-rrt", "syclop-est"])
+def test_syclop_grows_outside_of_the_world_where_the_user_allows_it(planner: str) -> None:
+    """Its grid is that of the world; a state beyond had no cell, and the process ended by a signal."""
+    setup = make_setup(OPEN, planner)
+    space = setup.getStateSpace()
+    space.getSubspace(0).setBounds(bounds((-30.0, 30.0), (-30.0, 30.0)))
+    setup.setStateValidityChecker(ob.StateValidityCheckerFn(lambda state: space.satisfiesBounds(state)))
+    setup.setStartAndGoalStates(scoped(setup, -25.0, -25.0), scoped(setup, -21.0, -25.0), 1.5)
+    assert solve(setup, 300) in ("Exact solution", "Approximate solution")
+    assert setup.getSolutionPath().check()
+
+
+@pytest.mark.parametrize("planner", ["syclop-rrt", "syclop-est"])
+def test_an_approximate_solution_of_syclop_is_called_so(planner: str) -> None:
+    """OMPL's Syclop planners call every solution exact."""
+    setup = make_setup(replace(OPEN, goal=Goal(3.3, 1.7, tolerance=1e-9)), planner)
+    assert solve(setup, 50) == "Approximate solution"
+    assert not setup.haveExactSolutionPath()
+
+
+# control samplers
+
+
+class Slow(oc.ControlSampler):  # type: ignore[misc]
+    """A user's own choice of controls."""
+
+    def sample(self, control: Any, *_: Any) -> None:
+        control[0], control[1] = 0.3, 0.1
+
+
+@pytest.mark.parametrize("planner", OURS)
+def test_a_control_sampler_of_ones_own_is_refused_where_a_law_chooses(planner: str) -> None:
+    """It was never asked, and nobody said so."""
+    setup = make_setup(OPEN, planner)
+    setup.getControlSpace().setControlSamplerAllocator(oc.ControlSamplerAllocator(Slow))
+    with pytest.raises(SettingsError, match=f"{planner}: control sampler: got 'Slow', expected OMPL's own.*rrt"):
+        setup.setup()
+
+
+@pytest.mark.parametrize("planner", ["rrt", "est", "sst"])
+def test_a_control_sampler_of_ones_own_is_obeyed_by_planners_of_ompl(planner: str) -> None:
+    setup = make_setup(OPEN, planner)
+    setup.getControlSpace().setControlSamplerAllocator(oc.ControlSamplerAllocator(Slow))
+    solve(setup, 50)
+    data = oc.PlannerData(setup.getSpaceInformation())
+    setup.getPlannerData(data)
+    children = ou.vectorUint()
+    edges = [(i, j) for i in range(data.numVertices()) for j in (data.getEdges(i, children), *children)[1:]]
+    controls = [data.getEdge(i, j).getControl() for i, j in edges]
+    assert {(control[0], control[1]) for control in controls} == {(0.3, 0.1)}
 
 
 # propagators
@@ -397,6 +495,18 @@ def test_a_users_propagator_is_refused_in_closed_loop(planner: str) -> None:
     setup = make_setup(replace(OPEN, planning=PlanningSettings(closed_loop=True)), planner)
     setup.setStatePropagator(oc.StatePropagatorFn(half_speed))
     with pytest.raises(SettingsError, match=f"{planner}: planning.closed_loop: got True, expected False with a state"):
+        setup.setup()
+
+
+@pytest.mark.parametrize("closed_loop", [False, True])
+@pytest.mark.parametrize("planner", ["cb-rrt", "cb-rrt-compiled", "cb-rrt-robust"])
+def test_a_propagator_that_takes_other_controls_is_refused(planner: str, closed_loop: bool) -> None:
+    """A propagator of ours in open loop was taken in closed loop, and drove references as velocities."""
+    planning = PlanningSettings(closed_loop=closed_loop)
+    setup = make_setup(replace(OPEN, planning=planning, goal=Goal(4.0, 0.0, theta=0.5, heading_tolerance=0.5)), planner)
+    si, other = setup.getSpaceInformation(), PlanningSettings(closed_loop=not closed_loop)
+    setup.setStatePropagator(TwoWheelPropagator(si, OPEN.robot, other))
+    with pytest.raises(SettingsError, match=f"{planner}: planning.closed_loop: got {closed_loop}, expected"):
         setup.setup()
 
 
@@ -474,6 +584,74 @@ def test_one_planner_alone_is_given_a_directed_sampler(planner: type) -> None:
     assert type(si.allocDirectedControlSampler()) is oc.SimpleDirectedControlSampler
 
 
+@pytest.mark.parametrize("planner", [oc.SST, oc.KPIECE1, oc.SyclopEST])
+def test_a_planner_that_never_asks_for_a_directed_sampler_is_given_none(planner: type) -> None:
+    """The sampler was ignored."""
+    si = make_setup(OPEN, "rrt").getSpaceInformation()
+    with pytest.raises(
+        SettingsError, match=f"planner: got {planner.__name__}, expected one that extends by a directed"
+    ):
+        with_directed_sampler(planner, si, allocations(KanayamaDirectedControlSampler, []))
+
+
+def test_an_allocator_that_makes_no_directed_sampler_is_told_so() -> None:
+    """OMPL called a method of None, which ended the process."""
+    setup = make_setup(OPEN, "rrt")
+    setup.setPlanner(with_directed_sampler(oc.RRT, setup.getSpaceInformation(), lambda si: None))
+    with pytest.raises(SettingsError, match="directed sampler: got None, expected an ompl.control"):
+        solve(setup, 10)
+
+
+# names, problems and seeds
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_a_set_up_is_printed_before_it_is_set_up(compiled: bool) -> None:
+    """The projection was not set up then, and the process ended by a signal."""
+    setup = make_setup(OPEN, "cb-rrt", compiled)
+    for part in (setup, setup.getProblemDefinition(), setup.getPlanner()):
+        assert str(part)
+    assert "Projection of dimension 2" in setup.getStateSpace().settings()
+    assert "SE2xR2" in setup.getSpaceInformation().settings()
+
+
+def test_weights_without_a_distance_are_an_error() -> None:
+    """OMPL refuses them, and printed the projection that was not set up."""
+    setup = make_setup(OPEN, "cb-rrt")
+    setup.getStateSpace().setSubspaceWeight(0, 0.0)
+    with pytest.raises(RuntimeError, match="longest valid segment"):
+        setup.setup()
+
+
+@pytest.mark.parametrize("planner", MOST)
+def test_a_planner_may_have_another_name(planner: str) -> None:
+    """Under a name of the user's choice, our planners no longer knew themselves."""
+    setup = make_setup(OPEN, planner)
+    setup.getPlanner().setName("mine")
+    assert solve(setup) == "Exact solution"
+    assert setup.getProblemDefinition().getSolutions()[0].plannerName_ == "mine"
+
+
+@pytest.mark.parametrize("planner", OURS)
+def test_a_planner_without_a_problem_says_so(planner: str) -> None:
+    alone = make_planner(make_setup(OPEN, planner).getSpaceInformation(), OPEN, planner)
+    with pytest.raises(RuntimeError, match=f"{planner}: Problem definition not specified"):
+        alone.solve(0.1)
+
+
+@pytest.mark.parametrize("planner", OURS)
+def test_the_seed_of_ompl_makes_plans_repeatable(planner: str) -> None:
+    """The compiled planners drew a fresh seed all the same."""
+
+    def path(seed: int) -> str:
+        setup = make_setup(OPEN, planner)
+        assert solve(setup, seed=seed) == "Exact solution"
+        found: str = setup.getSolutionPath().printAsMatrix()
+        return found
+
+    assert path(7) == path(7) != path(8)
+
+
 # our parts in a user's own set-up
 
 WORLD = World(Bounds((-5.0, -5.0), (5.0, 5.0)), [Box((-0.5, -5.0), (0.5, 2.0))])
@@ -516,6 +694,46 @@ def test_our_parts_work_by_hand_and_their_paths_verify(sampler: Any, planner: An
     assert trajectory.kinematic == (sampler is SteeringDirectedControlSampler)
     assert verify(trajectory, scenario).ok
     assert path.asGeometric().getStateCount() == len(trajectory)
+
+
+def test_a_checker_that_comes_later_is_asked_before_the_first_extension() -> None:
+    """A sampler of ours in a planner of OMPL's went by the old one for up to 4096 extensions."""
+    setup = make_setup(replace(OPEN, goal=Goal(4.0, 0.0, tolerance=1e-9)), "rrt")
+    si = setup.getSpaceInformation()
+    setup.setPlanner(with_directed_sampler(oc.RRT, si, allocations(KanayamaDirectedControlSampler, [])))
+
+    def nodes_above() -> int:
+        data = ob.PlannerData(si)
+        setup.getPlannerData(data)
+        return sum(data.getVertex(i).getState()[0][1] >= 0.5 for i in range(data.numVertices()))
+
+    solve(setup, 60)
+    before = nodes_above()
+    setup.setStateValidityChecker(ob.StateValidityCheckerFn(lambda state: state[0][1] < 0.5))
+    solve(setup, 300)
+    assert nodes_above() == before > 0
+
+
+def test_world_and_robot_of_a_part_cannot_be_replaced() -> None:
+    """Compiled code went on with the old ones."""
+    si = by_hand()[0]
+    for part, name in ((FclStateValidityChecker(si, ROBOT, WORLD), "world"), (TwoWheelPropagator(si, ROBOT), "robot")):
+        with pytest.raises(AttributeError, match=f"'{name}'|no setter|can't set"):
+            setattr(part, name, None)
+
+
+def test_a_control_space_of_another_layout_is_refused() -> None:
+    """Compiled code would read a number of the control that is not there."""
+    space = make_state_space(WORLD, ROBOT)
+    for controls, closed_loop in (
+        (oc.RealVectorControlSpace(space, 1), False),
+        (oc.RealVectorControlSpace(space, 4), False),
+        (oc.DiscreteControlSpace(space, 0, 3), False),
+        (make_control_space(space, ROBOT), True),
+    ):
+        si = oc.SpaceInformation(space, controls)
+        with pytest.raises(SettingsError, match="control space: got "):
+            TwoWheelPropagator(si, ROBOT, PlanningSettings(closed_loop=closed_loop))
 
 
 @pytest.mark.parametrize("make", [TwoWheelPropagator, lambda si, robot: FclStateValidityChecker(si, robot, WORLD)])

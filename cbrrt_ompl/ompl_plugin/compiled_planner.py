@@ -10,11 +10,18 @@ from numpy.typing import NDArray
 
 from cbrrt_ompl.motion.model import STEERING
 from cbrrt_ompl.ompl_plugin.asked_search import AskedSearch
-from cbrrt_ompl.ompl_plugin.binding import ob, oc
+from cbrrt_ompl.ompl_plugin.binding import ob, oc, ou
 from cbrrt_ompl.ompl_plugin.extender import Extender
 from cbrrt_ompl.ompl_plugin.goals import region_of
-from cbrrt_ompl.ompl_plugin.space import write_state
-from cbrrt_ompl.ompl_plugin.user_parts import Query, check_parts, check_sampling, is_same_part, query_of
+from cbrrt_ompl.ompl_plugin.space import read_state, write_state
+from cbrrt_ompl.ompl_plugin.user_parts import (
+    Query,
+    check_control_sampler,
+    check_parts,
+    check_sampling,
+    is_same_part,
+    query_of,
+)
 from cbrrt_ompl.ompl_plugin.warm_up import warm_up
 from cbrrt_ompl.planners.registry import planner_named, scenario_for
 from cbrrt_ompl.planners.search import Search
@@ -27,10 +34,10 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
     """CB-RRT or S-RRT as one compiled loop.
 
     It plans for robot, world and settings of its scenario, from the valid start states of the problem definition to its
-    goal, and owns its random numbers: OMPL's seed means nothing to it. Step, longest duration, validity checker,
-    propagator and goal are those that are there at ``solve``. As long as they are ours (and the goal one that the
-    kernels know), the compiled loop does everything; where a user has put others in their place, the kernels choose
-    samples, nodes and controls, and OMPL's parts judge each step between their calls, at a fraction of the speed.
+    goal, and owns its random numbers, seeded by those of OMPL. Step, longest duration, validity checker, propagator and
+    goal are those that are there at ``solve``. As long as they are ours (and the goal one that the kernels know), the
+    compiled loop does everything; where a user has put others in their place, the kernels choose samples, nodes and
+    controls, and OMPL's parts judge each step between their calls, at a fraction of the speed.
 
     ``solve`` goes on with the tree that is there, unless ``clear`` was called or starts, goal or parts have changed.
 
@@ -45,11 +52,12 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
             si: the space information of the problem.
             scenario: robot, world and settings.
             name: `cb-rrt-compiled`, `cb-rrt-robust` or `s-rrt-compiled`.
-            seed: of the first tree; the next ones go on from there. None draws a fresh one.
+            seed: of the first tree; the next ones go on from there. None takes one of those that OMPL deals out.
         """
         super().__init__(si, name)
         self.search: Search | None = None
         self._scenario, self._seed = scenario_for(name, scenario), seed
+        self._kind = name  # the name may be changed
         self._starts: list[State] = []
         self._query: Query | None = None
         self._goal: tuple[Any, Any] = (None, None)
@@ -58,7 +66,8 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
         """Compile, and refuse what this planner cannot take.
 
         Raises:
-            SettingsError: see :func:`cbrrt_ompl.ompl_plugin.user_parts.check_parts` and
+            SettingsError: see :func:`cbrrt_ompl.ompl_plugin.user_parts.check_parts`,
+                :func:`cbrrt_ompl.ompl_plugin.user_parts.check_control_sampler` and
                 :func:`cbrrt_ompl.ompl_plugin.user_parts.check_sampling`.
         """
         warm_up()
@@ -86,7 +95,7 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
         should_stop = condition if callable(condition) else ob.timedPlannerTerminationCondition(float(condition))
         self._forget_what_has_changed(problem)
         if self.search is None:
-            self._starts = [start for start in self._query.starts if self._is_valid(start)] if self._query else []
+            self._starts = self._valid_starts(problem)
             if not self._starts:
                 return ob.PlannerStatus(ob.PlannerStatus.INVALID_START)
             self.search = self._new_search(self._starts)
@@ -99,8 +108,9 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
     def _check(self) -> None:
         """Refuse what this planner cannot take."""
         si = self.getSpaceInformation()
-        check_parts(si, self._scenario, self.getName())
-        check_sampling(si.getStateSpace(), self.getName())
+        check_parts(si, self._scenario, self._kind)
+        check_control_sampler(si.getControlSpace(), self._kind)
+        check_sampling(si.getStateSpace(), self._kind)
 
     def _conclude(self, problem: Any, should_stop: Callable[[], bool]) -> None:
         """Hand over the solution; what is left of the time may be used."""
@@ -128,12 +138,11 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
                 self.clear()
         self._query, self._goal = query, (goal, region)
 
-    def _is_valid(self, start: State) -> bool:
-        """Whether OMPL's planners would begin at a start."""
+    def _valid_starts(self, problem: Any) -> list[State]:
+        """The starts at which OMPL's planners would begin."""
         si = self.getSpaceInformation()
-        state = ob.State(si.getStateSpace())
-        write_state(state, start)
-        return bool(si.satisfiesBounds(state()) and si.isValid(state()))
+        starts = (problem.getStartState(i) for i in range(problem.getStartStateCount()))
+        return [read_state(start) for start in starts if si.satisfiesBounds(start) and si.isValid(start)]
 
     def _new_search(self, starts: list[State]) -> Search:
         """A search from valid starts: compiled, or with OMPL's parts asked where they are a user's."""
@@ -143,13 +152,13 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
             scenario.robot,
             scenario.world,
             scenario.planning,
-            kinematic=planner_named(self.getName()).law(scenario.planning) == STEERING,
+            kinematic=planner_named(self._kind).law(scenario.planning) == STEERING,
             ompl_goal=self._goal[0],
         )
         settings: dict[str, Any] = {
-            "seed": self._seed,
+            "seed": ou.RNG().getLocalSeed() if self._seed is None else self._seed,
             "goal_bias": scenario.planning.filled().goal_bias,
-            "robust": planner_named(self.getName()).is_robust,
+            "robust": planner_named(self._kind).is_robust,
         }
         if extender.is_compiled:
             neighbours = scenario.planning.nearest_neighbour

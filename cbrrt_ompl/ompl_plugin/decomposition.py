@@ -21,11 +21,12 @@ class PositionDecomposition(oc.GridDecomposition):  # type: ignore[misc]  # OMPL
             limits.setLow(i, bounds.min[i])
             limits.setHigh(i, bounds.max[i])
         super().__init__(CELLS_PER_SIDE, 2, limits)
+        self._bounds = bounds
 
     def project(self, state: Any, coord: Any) -> None:
-        """Position of a state."""
-        position = state[0]
-        coord[0], coord[1] = position[0], position[1]
+        """Position of a state; the nearest one in the grid where it is outside, where OMPL would not find a cell."""
+        position, low, high = state[0], self._bounds.min, self._bounds.max
+        coord[0], coord[1] = min(max(position[0], low[0]), high[0]), min(max(position[1], low[1]), high[1])
 
     def sampleFullState(self, sampler: Any, coord: Any, state: Any) -> None:  # noqa: N802  # OMPL's name
         """A random state at a given position."""

@@ -18,7 +18,8 @@ from cbrrt_ompl.motion.records import Records, record_array
 from cbrrt_ompl.ompl_plugin.asked_extension import OmplSteps
 from cbrrt_ompl.ompl_plugin.goals import region_of
 from cbrrt_ompl.ompl_plugin.propagators import NOWHERE, drives_like
-from cbrrt_ompl.ompl_plugin.space import check_space, covers, read_state
+from cbrrt_ompl.ompl_plugin.space import check_controls, check_space, covers, read_state
+from cbrrt_ompl.ompl_plugin.user_parts import loop_problems, step_problems
 from cbrrt_ompl.ompl_plugin.validity import is_of_ours
 from cbrrt_ompl.planners.extension import CHILD, EXTENDED, NO_CHILD, UNTRIED, extend, is_refused
 from cbrrt_ompl.planners.roll_out import STEPS, margin_at
@@ -78,6 +79,7 @@ class Extender:
             ompl_goal: goal of a problem definition, in the place of ``goal``.
         """
         check_space(si.getStateSpace())
+        check_controls(si.getControlSpace())
         self.end = np.empty(5)
         self.steps, self.command, self.control = 0, (0.0, 0.0), (0.0, 0.0, 0.0)
         self._si, self._kinematic = si, kinematic
@@ -113,8 +115,8 @@ class Extender:
         """See which parts the space information and the goal have now.
 
         Raises:
-            SettingsError: if the step is too long for the robot, or the settings ask for what a user's own parts
-                cannot promise.
+            SettingsError: if the step is no time or too long for the robot, or the settings ask for what a user's own
+                parts cannot promise, or for other controls than the propagator takes.
         """
         si, planning, space = self._si, self._planning, self._si.getStateSpace()
         law = STEERING if self._kinematic else CLOSED_LOOP if planning.closed_loop else OPEN_LOOP
@@ -122,14 +124,18 @@ class Extender:
         model = self.model
         model[:] = make_model(law, self._robot, region or NOWHERE, planning)
         step = si.getPropagationStepSize()
-        if step > 0.0:  # it is 0 until the space information is set up
+        propagator = si.getStatePropagator()
+        is_set_up = not step <= 0.0  # it is 0 until then
+        problems = loop_problems(propagator, law == CLOSED_LOOP) + (step_problems(step) if is_set_up else [])
+        if problems:
+            raise SettingsError(problems)
+        if is_set_up:
             if step != planning.step:
                 planning = replace(planning, step=step, horizon=step)
             check_step(self._robot, planning)
             model["dt"] = step
         if si.getMaxControlDuration() > 0:
             model["steps"] = si.getMaxControlDuration()
-        propagator = si.getStatePropagator()
         is_driven_by_us = drives_like(propagator, model)
         may_approach = is_driven_by_us and region is not None and propagator.goal == region
         model["approaches"] &= may_approach and self._control_dimension == 3

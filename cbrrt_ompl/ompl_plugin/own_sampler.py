@@ -12,10 +12,14 @@ from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
+from cbrrt_ompl.errors import Problem, Remark, SettingsError
 from cbrrt_ompl.ompl_plugin.binding import oc
 
 DEFAULT_SAMPLERS = ("SimpleDirectedControlSampler", "SteeredControlSampler")
 """What a space information allocates if nothing else is set: random controls, or a propagator that can steer."""
+
+WITH_DIRECTED_SAMPLER = (oc.RRT, oc.EST, oc.PDST, oc.SyclopRRT)
+"""Planners of OMPL's that ask for a directed sampler; the others draw controls and durations by themselves."""
 
 
 def with_directed_sampler(planner: type, si: Any, allocate: Callable[[Any], Any], *arguments: Any) -> Any:
@@ -33,7 +37,14 @@ def with_directed_sampler(planner: type, si: Any, allocate: Callable[[Any], Any]
 
     Returns:
         An object of a class derived from ``planner``.
+
+    Raises:
+        SettingsError: if planners of this class never ask for a directed sampler.
     """
+    if not issubclass(planner, WITH_DIRECTED_SAMPLER):
+        known = ", ".join(f"ompl.control.{one.__name__}" for one in WITH_DIRECTED_SAMPLER)
+        expected = f"one that extends by a directed sampler: {known}"
+        raise SettingsError(Problem("planner", Remark(planner.__name__), expected))
     made = _class_with_sampler(planner)(si, *arguments)
     made._allocate_by = allocate
     return made
@@ -65,6 +76,9 @@ class OwnSampler:
 
     def solve(self, *condition: Any) -> Any:
         """Solve; the other planners allocate their sampler here, the first time after ``clear``."""
+        look_again = getattr(self.sampler, "look_again", None)
+        if look_again is not None:  # one of ours, which goes by the parts that it has seen
+            look_again()
         with self._own_sampler():
             return super().solve(*condition)  # type: ignore[misc]  # OMPL's
 
@@ -96,8 +110,11 @@ class OwnSampler:
                 si.setup()
 
     def _allocate(self, si: Any) -> Any:
-        self.sampler = self.allocate(si)
-        return self.sampler
+        made = self.allocate(si)
+        if not isinstance(made, oc.DirectedControlSampler):  # OMPL would crash on None
+            raise SettingsError(Problem("directed sampler", made, "an ompl.control.DirectedControlSampler"))
+        self.sampler = made
+        return made
 
     def _is_overruled(self, si: Any) -> bool:
         """Whether a user has put another directed sampler into the space information: that one is obeyed."""

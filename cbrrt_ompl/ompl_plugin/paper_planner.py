@@ -12,7 +12,7 @@ from cbrrt_ompl.ompl_plugin.samplers import (
     KanayamaDirectedControlSampler,
     SteeringDirectedControlSampler,
 )
-from cbrrt_ompl.ompl_plugin.user_parts import Query, check_parts, query_of
+from cbrrt_ompl.ompl_plugin.user_parts import Query, check_control_sampler, check_parts, query_of
 from cbrrt_ompl.ompl_plugin.warm_up import warm_up
 from cbrrt_ompl.planners.registry import Steering, planner_named
 from cbrrt_ompl.scenario.scenario import Scenario
@@ -45,6 +45,7 @@ class PaperPlanner(OwnSampler, oc.RRT):  # type: ignore[misc]  # OMPL has no typ
         self.setName(name)
         self.setGoalBias(scenario.planning.filled().goal_bias)
         self._scenario, self._compiled = scenario, compiled
+        self._kind = name  # the name may be changed
         self._query: Query | None = None
         self._goal: Any = None
 
@@ -52,15 +53,17 @@ class PaperPlanner(OwnSampler, oc.RRT):  # type: ignore[misc]  # OMPL has no typ
         """Compile, and refuse what this planner cannot take.
 
         Raises:
-            SettingsError: see :func:`cbrrt_ompl.ompl_plugin.user_parts.check_parts`.
+            SettingsError: see :func:`cbrrt_ompl.ompl_plugin.user_parts.check_parts` and
+                :func:`cbrrt_ompl.ompl_plugin.user_parts.check_control_sampler`.
         """
         warm_up()
-        check_parts(self.getSpaceInformation(), self._scenario, self.getName())
+        self._check()
         super().setup()
 
     def solve(self, *condition: Any) -> Any:
         """Grow the tree, with the parts and towards the goal that are there now."""
-        check_parts(self.getSpaceInformation(), self._scenario, self.getName())
+        self.checkValidity()
+        self._check()
         problem = self.getProblemDefinition()
         query = query_of(problem)
         if self._query is not None and not self._query.is_continued_by(query):
@@ -72,6 +75,13 @@ class PaperPlanner(OwnSampler, oc.RRT):  # type: ignore[misc]  # OMPL has no typ
         raise_errors()
         return status
 
+    def _check(self) -> None:
+        """Refuse what this planner cannot take."""
+        si = self.getSpaceInformation()
+        check_parts(si, self._scenario, self._kind)
+        if self.looks_around:
+            check_control_sampler(si.getControlSpace(), self._kind)
+
     def clear(self) -> None:
         """Forget the tree."""
         super().clear()
@@ -80,7 +90,7 @@ class PaperPlanner(OwnSampler, oc.RRT):  # type: ignore[misc]  # OMPL has no typ
     def allocate(self, si: Any) -> ExtensionSampler:
         """Make the sampler of a tree."""
         scenario = self._scenario
-        return SAMPLERS[planner_named(self.getName()).steering](
+        return SAMPLERS[planner_named(self._kind).steering](
             si,
             scenario.robot,
             scenario.world,

@@ -15,7 +15,7 @@ from cbrrt_ompl.ompl_plugin.binding import oc
 from cbrrt_ompl.ompl_plugin.compiled_methods import use_compiled_methods
 from cbrrt_ompl.ompl_plugin.native_methods import make_propagator_native
 from cbrrt_ompl.ompl_plugin.reals import StateReals
-from cbrrt_ompl.ompl_plugin.space import STATE_DIMENSION, check_space
+from cbrrt_ompl.ompl_plugin.space import STATE_DIMENSION, check_controls, check_space
 from cbrrt_ompl.problem.robot import Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings
 
@@ -31,8 +31,6 @@ class TwoWheelPropagator(oc.StatePropagator):  # type: ignore[misc]  # OMPL has 
     at. OMPL calls this once an integration step, and steps of any duration are taken.
 
     Attributes:
-        robot: whose limits and gains are kept.
-        goal: where final approaches lead to; None where there are none.
         model: one record, see :func:`cbrrt_ompl.motion.model.make_model`.
     """
 
@@ -55,12 +53,16 @@ class TwoWheelPropagator(oc.StatePropagator):  # type: ignore[misc]  # OMPL has 
             kinematic: whether the velocities jump, as for S-RRT.
             goal: where final approaches lead to; None where there are none.
             compiled: whether OMPL calls compiled code, see :mod:`cbrrt_ompl.ompl_plugin.compiled_methods`.
+
+        Raises:
+            SettingsError: if the state space or the control space is laid out otherwise than ours.
         """
         super().__init__(si)
         planning = planning or PlanningSettings()
         law = STEERING if kinematic else CLOSED_LOOP if planning.closed_loop else OPEN_LOOP
         check_space(si.getStateSpace())
-        self.robot, self.goal = robot, goal
+        check_controls(si.getControlSpace(), law == CLOSED_LOOP)
+        self._robot, self._goal = robot, goal
         self.model = make_model(law, robot, goal or NOWHERE, planning)
         self._reals = StateReals(si.getStateSpace(), STATE_DIMENSION)
         dimension = si.getControlSpace().getDimension()
@@ -78,6 +80,16 @@ class TwoWheelPropagator(oc.StatePropagator):  # type: ignore[misc]  # OMPL has 
         advance_values(self._reals.values, control[0], control[1], third, self.model, duration)
         raise_errors()
         self._reals.write(result)
+
+    @property
+    def robot(self) -> Robot:
+        """Whose limits and gains are kept."""
+        return self._robot
+
+    @property
+    def goal(self) -> Goal | None:
+        """Where final approaches lead to; None where there are none."""
+        return self._goal
 
     @property
     def drives_by_model(self) -> bool:

@@ -83,6 +83,11 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         self.extender.aim_at(goal)
         self._tell_record()
 
+    def look_again(self) -> None:
+        """See which parts the space information has now; by itself a sampler does so every `LOOK_PERIOD` extensions."""
+        self.extender.look_again()
+        self._tell_record()
+
     @property
     def samples(self) -> int:
         """Calls so far."""
@@ -104,8 +109,7 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         extender, children = self.extender, self._children
         self._record["samples"] += 1
         if self.samples % LOOK_PERIOD == 0:
-            extender.look_again()
-            self._tell_record()
+            self.look_again()
         self._node.read(source)
         self._sample.read(dest)
         if children.make_room():

@@ -18,6 +18,7 @@ from cbrrt_ompl.ompl_plugin.native_space import make_native
 from cbrrt_ompl.ompl_plugin.paper_planner import PaperPlanner
 from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
 from cbrrt_ompl.ompl_plugin.space import make_control_space, make_reference_space, make_state_space, write_state
+from cbrrt_ompl.ompl_plugin.syclop import SYCLOP
 from cbrrt_ompl.ompl_plugin.validity import FclStateValidityChecker
 from cbrrt_ompl.planners.registry import Backend, planner_named, scenario_for
 from cbrrt_ompl.scenario.scenario import Scenario, check_scenario
@@ -49,7 +50,8 @@ def make_setup(scenario: Scenario, planner: str = "cb-rrt", compiled: bool | Non
 
     Returns:
         The set-up with state space, validity checker, propagator, start, goal and planner. Its limits are OMPL's: pass
-        ``solve`` a time or a termination condition; ``max_samples`` is a matter of :func:`cbrrt_ompl.plan`.
+        ``solve`` a time or a termination condition. ``max_samples`` ends compiled planners and
+        :func:`cbrrt_ompl.plan` alone.
 
     Raises:
         ScenarioError: if this is no scenario.
@@ -129,7 +131,7 @@ def make_planner(
         scenario: bounds (for Syclop's grid), goal bias, and all that the compiled planners plan for.
         planner: a known planner's name.
         compiled: see :func:`make_setup`.
-        seed: of a compiled planner; None draws a fresh one.
+        seed: of a compiled planner; None takes one of those that OMPL deals out.
     """
     row, scenario = planner_named(planner), scenario_for(planner, scenario)
     if row.backend is Backend.COMPILED:
@@ -137,7 +139,7 @@ def make_planner(
     if row.backend is Backend.PLUGIN:
         return PaperPlanner(si, scenario, planner, compiled)
     if row.ompl_class.startswith("Syclop"):
-        made = getattr(oc, row.ompl_class)(si, PositionDecomposition(scenario.world.bounds))
+        made = SYCLOP[row.ompl_class](si, PositionDecomposition(scenario.world.bounds))
         made.setNumFreeVolumeSamples(FREE_VOLUME_SAMPLES)
     else:
         module, _, name = row.ompl_class.rpartition(".")

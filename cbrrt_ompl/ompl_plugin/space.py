@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from cbrrt_ompl.collision.world import World
-from cbrrt_ompl.errors import Problem, SettingsError
+from cbrrt_ompl.errors import Problem, Remark, SettingsError
 from cbrrt_ompl.motion.kinematics import wrap_angle
 from cbrrt_ompl.ompl_plugin.binding import ob, oc
 from cbrrt_ompl.ompl_plugin.compiled_methods import use_compiled_methods
@@ -17,6 +17,9 @@ from cbrrt_ompl.problem.settings import State
 
 STATE_DIMENSION = 5
 """Reals of a state: x, y, theta, v, omega."""
+
+LAYOUT = [(ob.STATE_SPACE_REAL_VECTOR, 2), (ob.STATE_SPACE_SO2, 1), (ob.STATE_SPACE_REAL_VECTOR, 2)]
+"""Type and dimension of the components of our space."""
 
 
 BOUNDS_SLACK = 1e-9
@@ -59,6 +62,8 @@ def make_state_space(bounds: Bounds | World, limits: Limits | Robot, compiled: b
 def register_projection(space: Any, compiled: bool | None = None) -> None:
     """Make the projection to (x, y) the default one of a space of ours."""
     projection = ob.SubspaceProjectionEvaluator(space, 0)
+    space.getSubspace(0).setup()  # which makes the projection that this one leads to
+    projection.setup()  # else OMPL crashes where it prints a space that is not set up
     space.registerDefaultProjection(make_native(projection) if use_compiled_methods(compiled) else projection)
 
 
@@ -135,13 +140,30 @@ def check_space(space: Any) -> None:
     Raises:
         SettingsError: if it is none of :func:`make_state_space`.
     """
-    if not (
-        space.isCompound()
-        and space.getSubspaceCount() == 3
-        and [space.getSubspace(i).getDimension() for i in range(3)] == [2, 1, 2]
-    ):
+    parts = [space.getSubspace(i) for i in range(space.getSubspaceCount())] if space.isCompound() else []
+    if [(part.getType(), part.getDimension()) for part in parts] != LAYOUT:
         expected = "one of make_state_space(world, robot): (x, y), theta, (v, omega)"
         raise SettingsError(Problem("state space", space.getName(), expected))
+
+
+def check_controls(controls: Any, closed_loop: bool = False) -> None:
+    """Refuse a control space of another layout than ours.
+
+    Args:
+        controls: the control space.
+        closed_loop: whether its controls have to be references.
+
+    Raises:
+        SettingsError: if it is no R^2 or R^3, or no R^3 in closed loop.
+    """
+    if controls.isCompound() or not isinstance(controls, oc.RealVectorControlSpace):
+        found, is_known = type(controls).__name__, False
+    else:
+        dimension = controls.getDimension()
+        found, is_known = f"R^{dimension}", dimension == 3 or (dimension == 2 and not closed_loop)
+    if not is_known:
+        expected = "R^3, references (x, y, theta), in closed loop" if closed_loop else "R^2 or R^3, (v, omega) first"
+        raise SettingsError(Problem("control space", Remark(found), expected))
 
 
 def bounds_of(space: Any) -> tuple[float, ...]:

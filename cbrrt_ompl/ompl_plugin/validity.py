@@ -21,9 +21,7 @@ class FclStateValidityChecker(ob.StateValidityChecker):  # type: ignore[misc]  #
 
     Contract with OMPL: the state is only read. A state with a number that is not finite is invalid.
 
-    Attributes:
-        robot: whose footprint is posed.
-        world: obstacles and walls.
+    Robot and world stay: for others, make another checker.
     """
 
     def __init__(self, si: Any, robot: Robot, world: World, *, compiled: bool | None = None) -> None:
@@ -39,12 +37,22 @@ class FclStateValidityChecker(ob.StateValidityChecker):  # type: ignore[misc]  #
         super().__init__(si)
         check_space(si.getStateSpace())
         self._record = record_array(1, CHECKER_RECORD)
-        self.robot, self.world = robot, world
+        self._robot, self._world = robot, world
         self._scene = world.scene(robot.footprint)
         self._space = si.getStateSpace()
         self._reals = StateReals(self._space, STATE_DIMENSION)
         if type(self).isValid is _IS_VALID and use_compiled_methods(compiled):
             make_checker_native(self, self._scene, self._space, self._record)
+
+    @property
+    def robot(self) -> Robot:
+        """Whose footprint is posed."""
+        return self._robot
+
+    @property
+    def world(self) -> World:
+        """Obstacles and walls."""
+        return self._world
 
     @property
     def checked(self) -> int:
