@@ -7,9 +7,13 @@ import shutil
 import uuid
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from pathlib import Path
 
 from cbrrt_ompl.errors import CbrrtError, InputError, Problem, Refusal, Remark
+
+_READ: ContextVar[list[Path] | None] = ContextVar("_READ", default=None)
+"""Where :func:`note_read` writes to."""
 
 
 def as_path(path: object, error: type[InputError]) -> Path:
@@ -38,6 +42,24 @@ def refusal(error: Exception, verb: str = "read") -> Refusal:
         return Refusal("no such file" if verb == "read" else "no such folder to write in")
     words = str(getattr(error, "strerror", None) or "no name of a file")
     return Refusal(f"cannot {verb} {{}}: {words[0].lower()}{words[1:]}")
+
+
+@contextmanager
+def files_read() -> Iterator[list[Path]]:
+    """The files that worlds and robots are read from meanwhile."""
+    files: list[Path] = []
+    token = _READ.set(files)
+    try:
+        yield files
+    finally:
+        _READ.reset(token)
+
+
+def note_read(path: Path) -> None:
+    """Tell :func:`files_read` of a file."""
+    files = _READ.get()
+    if files is not None:
+        files.append(path)
 
 
 def write_file(path: Path, content: bytes | str, error: type[InputError] = InputError) -> None:

@@ -46,7 +46,7 @@ SOLVED, TIME_LIMIT, SAMPLE_LIMIT, NO_WAY = "solved", "time limit", "sample limit
 """How a plan ends."""
 
 PATIENCE = 0.5
-"""Planning time after which a plan looks for a proof that there is no way [s]."""
+"""Planning time after which a plan looks for a proof that there is no way, where as much again is left for it [s]."""
 
 PROGRESS_PERIOD = 0.1
 """Time between two reports of progress [s]."""
@@ -350,7 +350,7 @@ class _Watch:
         """Begin to count the time."""
         self.began = time.perf_counter()
         self._next_report = self.began + PROGRESS_PERIOD
-        self._doubts_at = self.began + PATIENCE
+        self._doubts_at = self.began + PATIENCE if self._time_limit >= 2.0 * PATIENCE else math.inf
 
     def left(self) -> float:
         """Time that is left [s]."""

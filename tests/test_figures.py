@@ -380,3 +380,12 @@ class TestExtension:
         tips = [text.xy for text in ax.texts if not text.get_text()]  # type: ignore[attr-defined]
         assert len(tips) == 3
         assert all(x0 < x < x1 and y0 < y < y1 for x, y in tips)
+
+
+def test_a_long_drive_has_a_dot_every_few_seconds() -> None:
+    """Of one that took minutes, the dots hid the curve."""
+    t = np.linspace(0.0, 115.0, 231)
+    zero, one = np.zeros(231), np.ones(231)
+    axes = Figure().subplots(2)
+    draw_velocities(axes, Trajectory(t, t, zero, zero, one, zero, one, zero), Limits())
+    np.testing.assert_allclose(points(axes[0], "every 5 s")[:, 0], np.arange(0.0, 116.0, 5.0))

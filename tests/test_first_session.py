@@ -290,3 +290,20 @@ def test_a_goal_in_position_alone_is_arrived_at_at_rest_where_asked_for(
     end = Trajectory.load("t.csv").states[-1]
     assert abs(end[3:]).max() <= REST_SPEED
     assert math.hypot(end[0] - 3.2, end[1] - 1.5) < 0.25
+
+
+def test_a_map_that_is_not_there_is_no_map_of_another_kind(room: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, errors = run(capsys, "new", "nothere.yaml", "--robot", "jackal")
+    assert (code, errors) == (2, ["cbrrt: error: no such file: nothere.yaml"])
+
+
+def test_the_places_that_are_picked_lie_on_one_side_of_a_keepout_mask(room: Path) -> None:
+    """They were those of the map alone, and there was no way."""
+    grid = np.full((60, 80), 254, dtype=np.uint8)
+    grid[40:, 38:42] = 0  # closes the gap below the wall
+    Image.fromarray(grid).save("mask.png")
+    Path("mask.yaml").write_text("image: mask.png\nresolution: 0.05\norigin: [0, 0, 0]\n")
+    ask = ["--robot", "turtlebot3_burger", "--output", "tour.yaml"]
+    assert main(["new", "room.yaml", *ask, "--set", "map.keepout=mask.yaml"]) == 0
+    scenario = load_scenario("tour.yaml")
+    assert (scenario.start.x < 2.0) == (scenario.goal.x < 2.0)

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+import shapely
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from numpy.typing import NDArray
@@ -341,12 +342,17 @@ def test_a_broken_movingai_map_is_refused_by_line(tmp_path: Path, old: str, new:
         ({"image": "[a]"}, "image: got ['a'], expected the name of an image file"),
         ({"image": "flor.pgm"}, "image: got 'flor.pgm', expected a file that exists, looked for "),
         ({"resolution": None}, "resolution: missing"),
-        ({"resolution": "0"}, "resolution: got 0, expected the side of a cell, a number above 0 [m]"),
+        (
+            {"resolution": "0"},
+            "resolution: got 0, expected the side of a cell, a number above 0, from 1e-09 to 1e+06 [m]",
+        ),
         ({"resolution": "-0.05"}, "resolution: got -0.05"),
         ({"resolution": ".nan"}, "resolution: got nan"),
         ({"resolution": ".inf"}, "resolution: got inf"),
         ({"resolution": "five"}, "resolution: got 'five'"),
         ({"resolution": "true"}, "resolution: got True"),
+        ({"resolution": "1e-12"}, "resolution: got 1e-12, expected the side of a cell, a number above 0, from 1e-09"),
+        ({"resolution": "1e9"}, "resolution: got 1000000000.0, expected the side of a cell, a number above 0, from"),
         ({"resolution": "1e6"}, "expected a map within 1e+06 m of zero"),
         ({"origin": None}, "origin: missing"),
         ({"origin": "[0, 0]"}, "origin: got [0, 0], expected three finite numbers [x, y, yaw]"),
@@ -791,3 +797,24 @@ def test_the_problems_of_dynobench_are_solved(name: str, forward_only: bool, tol
     assert result.status == "solved"
     assert result.trajectory is not None
     assert verify(result.trajectory, scenario).violations == ()
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=50, deadline=None)
+def test_a_cell_is_drawn_where_geos_says_that_an_obstacle_reaches_into_it(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    turned = OrientedBox(tuple(rng.uniform(0.0, 3.0, 2)), tuple(rng.uniform(0.01, 2.0, 2)), rng.uniform(-4.0, 4.0))
+    angles = (np.arange(9) + rng.uniform(0.0, 0.9, 9)) * 2.0 * np.pi / 9.0
+    star = rng.uniform(0.2, 1.2, (9, 1)) * np.column_stack([np.cos(angles), np.sin(angles)])
+    hole = 0.1 * np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)])
+    holed = Polygon(np.array([(0.0, 0.0), (1.0, 0.2), (1.2, 1.0), (0.1, 0.9)]) + 1.5, (hole + 2.0,))
+    disc = Disc(tuple(rng.uniform(0.0, 3.0, 2)), rng.uniform(0.01, 1.0))
+    for obstacle in (turned, Polygon(star + rng.uniform(0.0, 3.0, 2)), holed, disc):
+        found = rasterize(World(Bounds((0.0, 0.0), (3.0, 2.5)), [obstacle]), 0.1).cells == X
+        y, x = np.meshgrid(0.1 * np.arange(25), 0.1 * np.arange(30), indexing="ij")
+        squares = shapely.box(x + 1e-7, y + 1e-7, x + 0.1 - 1e-7, y + 0.1 - 1e-7)
+        if isinstance(obstacle, Disc):
+            expected = shapely.distance(squares, shapely.Point(obstacle.center)) <= obstacle.radius
+        else:
+            expected = shapely.intersects(squares, obstacle.to_shapely())
+        np.testing.assert_array_equal(found, expected)

@@ -165,3 +165,11 @@ def test_a_file_without_a_robot_is_refused_by_its_name(tmp_path: Path, text: str
     assert words in str(caught.value)
     assert f"robot.nav2: {tmp_path / 'nav2.yaml'}: " in str(caught.value)
     assert len(str(caught.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize("value", ["fast", '"0.26"', ".inf", "[0.26]"])
+def test_a_limit_that_is_no_number_is_refused_and_not_passed_over(tmp_path: Path, value: str) -> None:
+    """The robot got the paper's limit in its place, 1 m/s."""
+    (tmp_path / "nav2.yaml").write_text(DWB.replace("max_vel_x: 0.26", f"max_vel_x: {value}"))
+    with pytest.raises(ScenarioError, match=r"nav2\.yaml: max_vel_x: got .*, expected a finite number"):
+        scenario({"nav2": "nav2.yaml"}, tmp_path)

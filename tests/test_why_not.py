@@ -12,15 +12,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
+from cbrrt_ompl.cli import main
 from cbrrt_ompl.collision.free_poses import nearest_free_pose
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import ScenarioError
 from cbrrt_ompl.planning import approachable_goal, plan
-from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc
+from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, OrientedBox
 from cbrrt_ompl.problem.robot import Footprint, Limits, Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.scenario.connectivity import has_no_way
-from cbrrt_ompl.scenario.scenario import Scenario, load_scenario
+from cbrrt_ompl.scenario.scenario import Scenario, load_scenario, save_scenario
 from cbrrt_ompl.verification import verify
 
 WALLS = Bounds((0.0, 0.0), (6.0, 4.0))
@@ -169,3 +170,55 @@ def test_a_plan_ends_with_the_proof_and_not_with_its_time(planner: str) -> None:
     assert result.status == "no way"
     assert result.trajectory is None
     assert time.perf_counter() - began < 10.0
+
+
+def test_walls_that_lie_askew_do_not_make_the_proof_slow() -> None:
+    """In a map with a yaw it took 20 s: every turned wall was asked about each cell of the rectangle around it."""
+    askew = [OrientedBox((20.0, 20.0 + 0.5 * k), (70.0, 0.1), 0.75) for k in range(-20, 20)]
+    world = World(Bounds((0.0, 0.0), (40.0, 40.0)), askew)
+    assert not has_no_way(world, DISC, State(1.0, 10.0), Goal(1.0, 10.0, 0.3))  # the imports are not to be timed
+    began = time.process_time()
+    assert has_no_way(world, DISC, State(35.0, 2.0), Goal(2.0, 35.0, 0.3))
+    assert time.process_time() - began < 4.0
+
+
+def test_a_plan_that_is_to_end_soon_is_not_kept_waiting_for_a_proof() -> None:
+    """The proof began after half a second and took another half, whatever the time limit was."""
+    scenario = Scenario(
+        name="closed", world=gap(0.3), robot=Robot(DISC), start=State(1.0, 2.0), goal=Goal(5.0, 2.0, 0.3),
+        planning=PlanningSettings(max_samples=10**8),
+    )  # fmt: skip
+    result = plan(scenario, planner="cb-rrt-robust", seed=1, time_limit=0.7)
+    assert result.status == "time limit"
+
+
+@pytest.mark.parametrize(
+    ("samples", "width", "words"), [(10, 0.3, "status         no way"), (10, 0.6, "status         sample limit")]
+)
+def test_samples_that_run_out_soon_are_told_from_a_gap_too_narrow(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], samples: int, width: float, words: str
+) -> None:
+    """A robot too wide for its world was told of its samples alone where they ran out within half a second."""
+    scenario = Scenario(
+        name="gap", world=gap(width), robot=Robot(DISC), start=State(1.0, 2.0), goal=Goal(5.0, 2.0, 0.3),
+        planning=PlanningSettings(max_samples=samples),
+    )  # fmt: skip
+    save_scenario(scenario, tmp_path / "gap.yaml")
+    assert main(["plan", str(tmp_path / "gap.yaml"), "--planner", "cb-rrt-compiled", "--seed", "1"]) == 1
+    assert words in capsys.readouterr().out
+
+
+def test_a_robot_that_cannot_make_one_extension_is_told_of_the_horizon(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It was told of the time limit, and of a tree of one node."""
+    fast = Robot(SQUARE, Limits(0.0, 2.0, -0.5, 0.5))  # 4 m an extension, nearly straight on
+    scenario = Scenario(
+        name="room", world=World(Bounds((0.0, 0.0), (3.0, 3.0))), robot=fast, start=State(0.5, 1.5),
+        goal=Goal(2.5, 0.5, 0.2), planning=PlanningSettings(max_samples=20, horizon=2.0),
+    )  # fmt: skip
+    save_scenario(scenario, tmp_path / "room.yaml")
+    assert main(["plan", str(tmp_path / "room.yaml"), "--planner", "s-rrt-compiled", "--seed", "1"]) == 1
+    out = capsys.readouterr().out
+    assert "nodes          1\n" in out
+    assert out.endswith("no extension from the start was free: try a planning.horizon of less than 2 s\n")

@@ -19,7 +19,7 @@ from cbrrt_ompl.cli.arguments import (
 )
 from cbrrt_ompl.cli.exit_codes import DONE, FAILED
 from cbrrt_ompl.cli.output import heading, print_json, print_values
-from cbrrt_ompl.cli.output_files import add_output_files, check_output_files
+from cbrrt_ompl.cli.output_files import add_output_files, check_output_files, keeping_inputs
 from cbrrt_ompl.cli.progress import warm_up
 
 if TYPE_CHECKING:
@@ -74,14 +74,14 @@ def run(arguments: argparse.Namespace) -> int:
     from cbrrt_ompl.drive.unknown import load_obstacles, unknown_obstacles
     from cbrrt_ompl.scenario.scenario import load_scenario
 
-    scenario = load_scenario(arguments.scenario)
+    with keeping_inputs(arguments, FILES):
+        scenario = load_scenario(arguments.scenario)
+        listed = None if arguments.hidden is None else load_obstacles(arguments.hidden)
     names = ("sensor_range", "cycle", "planner", "max_samples", "max_iterations", "line_of_sight")
     settings = DriveSettings(**{name: getattr(arguments, name) for name in names})
-    hidden = None
+    hidden = listed
     if arguments.unknown is not None:
         hidden = unknown_obstacles(scenario, arguments.unknown, arguments.seed, settings.margin)
-    elif arguments.hidden is not None:
-        hidden = load_obstacles(arguments.hidden)
     warm_up(arguments.planner)
     result = drive(scenario, hidden, settings, arguments.seed)
     if arguments.trajectory is not None:

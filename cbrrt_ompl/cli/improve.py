@@ -16,7 +16,7 @@ from cbrrt_ompl.cli.arguments import (
 )
 from cbrrt_ompl.cli.exit_codes import DONE
 from cbrrt_ompl.cli.output import print_json, print_values
-from cbrrt_ompl.cli.output_files import add_output_files, check_output_files
+from cbrrt_ompl.cli.output_files import add_output_files, check_output_files, keeping_inputs
 from cbrrt_ompl.cli.progress import warm_up
 
 FILES = {"output": "write the improved trajectory", "figure": "draw both, and the duration against time"}
@@ -43,7 +43,8 @@ def run(arguments: argparse.Namespace) -> int:
     from cbrrt_ompl.optimise import Found, improve
     from cbrrt_ompl.scenario.scenario import load_scenario
 
-    scenario = load_scenario(arguments.scenario)
+    with keeping_inputs(arguments, FILES):
+        scenario = load_scenario(arguments.scenario)
     given = load_trajectory(arguments, scenario.robot)
     warm_up(None, improves=True)
     history: list[Found] = []

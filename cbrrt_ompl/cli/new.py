@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from cbrrt_ompl.cli.arguments import Commands, add_command, add_map
 from cbrrt_ompl.cli.exit_codes import DONE
 from cbrrt_ompl.cli.problem import add_problem, given_source, map_planner
-from cbrrt_ompl.errors import MISSING, InputError, Problem, Remark
+from cbrrt_ompl.errors import MISSING, InputError, Problem, Refusal, Remark
 
 if TYPE_CHECKING:
     from cbrrt_ompl.scenario.draft import Draft
@@ -34,6 +34,8 @@ def run(arguments: argparse.Namespace) -> int:
     from cbrrt_ompl.scenario.template import scenario_text
 
     output: Path | None = arguments.output
+    if arguments.scenario.suffix and not arguments.scenario.exists():
+        raise InputError(Problem("", Refusal("no such file"), "a map"), str(arguments.scenario))
     if not is_map(arguments.scenario):
         raise InputError(
             Problem("", Remark("no map"), "a map that 'map:' of a scenario reads"), str(arguments.scenario)
@@ -63,6 +65,7 @@ def _places(arguments: argparse.Namespace, draft: Draft, data: dict[str, Any]) -
     """Start and goal: as given, else two free places far from each other."""
     from cbrrt_ompl.scenario.maps.free_places import places_apart
     from cbrrt_ompl.scenario.maps.loading import load_map
+    from cbrrt_ompl.scenario.maps.rasterizing import rasterize
 
     assert draft.map is not None
     wrong = [problem for problem in draft.problems if problem.value is not MISSING]
@@ -71,7 +74,8 @@ def _places(arguments: argparse.Namespace, draft: Draft, data: dict[str, Any]) -
     found = {name: data[name] for name in ("start", "goal") if getattr(arguments, name) is not None}
     if len(found) == 2:
         return found
-    grid = load_map(draft.map.file, resolution=draft.map.resolution, unknown=draft.map.unknown)
+    side = load_map(draft.map.file, resolution=draft.map.resolution).resolution
+    grid = rasterize(draft.world, side)  # with all that blocks, keepout masks too
     (x, y), (goal_x, goal_y) = places_apart(grid, draft.robot.footprint.circumscribed_radius + _clearance(data))
     theta = math.radians(round(math.degrees(math.atan2(goal_y - y, goal_x - x))))
     start = {"x": x, "y": y, "theta": theta}

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 from cbrrt_ompl.errors import InputError, Problem, Refusal
+from cbrrt_ompl.files import files_read
 
 SUFFIXES = {
     "trajectory": (".csv", ".npz", ".json", ".mcap", ".yaml"),
@@ -70,6 +72,30 @@ def check_output_files(arguments: argparse.Namespace, names: Iterable[str]) -> N
         from cbrrt_ompl.figures.animation import check_animation_file
 
         check_animation_file(files["animation"])
+
+
+@contextmanager
+def keeping_inputs(arguments: argparse.Namespace, names: Iterable[str]) -> Iterator[None]:
+    """Read what a command works on, and refuse to write its results over that: a map's image is soon forgotten.
+
+    Args:
+        arguments: the command line.
+        names: options that the command writes files for.
+
+    Raises:
+        InputError: at the end, with every file to write that was read.
+    """
+    with files_read() as read:
+        yield
+    problems = [
+        Problem(f"--{name}", str(path), "another file: this one is read, and would be lost")
+        for name in names
+        if (path := getattr(arguments, name)) is not None
+        and path.exists()
+        and any(file.exists() and path.samefile(file) for file in read)
+    ]
+    if problems:
+        raise InputError(problems)
 
 
 def _problem_with(name: str, path: Path) -> Problem | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from cbrrt_ompl.cli.arguments import (
@@ -18,12 +19,13 @@ from cbrrt_ompl.cli.arguments import (
 )
 from cbrrt_ompl.cli.exit_codes import DONE, FAILED
 from cbrrt_ompl.cli.output import heading, print_json, print_values
-from cbrrt_ompl.cli.output_files import add_output_files, check_output_files
+from cbrrt_ompl.cli.output_files import add_output_files, check_output_files, keeping_inputs
 from cbrrt_ompl.cli.problem import MAP_PLANNERS, add_problem, given_scenario, map_planner
 from cbrrt_ompl.cli.progress import plan_progress, warm_up
 
 if TYPE_CHECKING:
     from cbrrt_ompl.planning import PlanResult
+    from cbrrt_ompl.scenario.scenario import Scenario
 
 FILES = {
     "trajectory": "write the trajectory",
@@ -53,15 +55,18 @@ def run(arguments: argparse.Namespace) -> int:
     """``cbrrt plan``."""
     check_output_files(arguments, FILES)
     from cbrrt_ompl.planners.registry import planner_named
-    from cbrrt_ompl.planning import plan
+    from cbrrt_ompl.planning import NO_WAY, SAMPLE_LIMIT, TIME_LIMIT, plan
     from cbrrt_ompl.scenario.sources import is_map
 
     planner = arguments.planner or (map_planner() if is_map(arguments.scenario) else "cb-rrt")
     limits = {"improve_for": arguments.improve_for, "max_iterations": arguments.max_iterations}
     improves = any(limit is not None for limit in limits.values())
-    scenario = given_scenario(arguments, lambda: warm_up(planner, improves))
+    with keeping_inputs(arguments, FILES):
+        scenario = given_scenario(arguments, lambda: warm_up(planner, improves))
     with plan_progress(planner_named(planner).settings(scenario.planning).max_samples, planner) as progress:
         result = plan(scenario, planner, arguments.seed, arguments.time_limit, progress=progress, **limits)
+    if result.status == SAMPLE_LIMIT and _is_hopeless(scenario):
+        result = replace(result, status=NO_WAY)
     trajectory = result.trajectory
     if arguments.trajectory is not None and trajectory is not None:
         trajectory.save(arguments.trajectory, scenario)
@@ -84,7 +89,17 @@ def run(arguments: argparse.Namespace) -> int:
         for name in unwritten:
             if files[name] is not None:
                 print(f"no trajectory, {files[name]} not written")
+        if result.nodes == 1 and result.status in (TIME_LIMIT, SAMPLE_LIMIT):
+            horizon = scenario.planning.horizon
+            print(f"no extension from the start was free: try a planning.horizon of less than {horizon:g} s")
     return DONE if result.solved else FAILED
+
+
+def _is_hopeless(scenario: Scenario) -> bool:
+    """Whether samples that ran out before a plan began to doubt were in vain."""
+    from cbrrt_ompl.scenario.connectivity import has_no_way
+
+    return has_no_way(scenario.world, scenario.robot.footprint, scenario.start, scenario.goal)
 
 
 def _data(result: PlanResult) -> dict[str, Any]:

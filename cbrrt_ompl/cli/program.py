@@ -43,7 +43,7 @@ COMMANDS = (
 EXAMPLES = """\
 examples:
   cbrrt plan paper_case1 --seed 1 --figure case1.png   a scene of the paper
-  cbrrt show depot.yaml --figure depot.png             a map of map_server
+  cbrrt show depot.yaml --figure depot_map.png         a map of map_server
   cbrrt plan depot.yaml --robot jackal --start 5 3 90deg --goal 24 10
   cbrrt new depot.yaml --robot jackal --output tour.yaml
   cbrrt drive office --seed 2 --animation office.gif   plan again on the way

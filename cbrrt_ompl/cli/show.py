@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from cbrrt_ompl.cli.arguments import Commands, add_command, add_scenario, load_trajectory
 from cbrrt_ompl.cli.exit_codes import DONE
-from cbrrt_ompl.cli.output_files import check_backend, check_output_files
+from cbrrt_ompl.cli.output_files import check_backend, check_output_files, keeping_inputs
 from cbrrt_ompl.cli.problem import add_problem, given_source, print_remarks
 from cbrrt_ompl.errors import MISSING, CbrrtError
 
@@ -42,10 +42,11 @@ def run(arguments: argparse.Namespace) -> int:
     from cbrrt_ompl.figures.style import legend_above
     from cbrrt_ompl.scenario.maps.loading import load_map
 
-    draft = _draft(arguments)
+    with keeping_inputs(arguments, ["figure"]):
+        draft = _draft(arguments)
+        grid = load_map(**_map_of(arguments, draft)) if draft is None or draft.map is not None else None
     robot = None if draft is None else draft.robot
     trajectory = None if arguments.trajectory is None else load_trajectory(arguments, robot)
-    grid = load_map(**_map_of(arguments, draft)) if draft is None or draft.map is not None else None
     print_remarks(grid)
     bounds = draft.world.bounds if draft is not None else grid.bounds() if grid is not None else None
     assert bounds is not None

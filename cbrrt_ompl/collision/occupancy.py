@@ -16,7 +16,7 @@ from numbers import Integral
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cbrrt_ompl.checks import is_number
+from cbrrt_ompl.checks import A_POSITIVE_NUMBER, SMALLEST, is_number
 from cbrrt_ompl.collision.pieces import Pieces, join, obstacle_pieces, rectangle_pieces
 from cbrrt_ompl.errors import MapError, Problem, Remark
 from cbrrt_ompl.kernels import inner_kernel, kernel
@@ -27,6 +27,9 @@ UNKNOWN, FREE, OCCUPIED = -1, 0, 100
 
 UNKNOWN_CELLS = ("occupied", "free")
 """What unknown cells may count as."""
+
+A_SIDE = f"the side of a cell, {A_POSITIVE_NUMBER} [m]"
+"""What the resolution of a grid is to be."""
 
 OCCUPIED_THRESHOLD = 0.65
 """A cell that is more likely occupied than this counts as occupied, unless a map says otherwise."""
@@ -264,8 +267,8 @@ def check_frame(shape: tuple[int, ...], resolution: float, origin: Sequence[floa
         MapError: with what is wrong with the resolution and the origin.
     """
     problems = []
-    if not (is_number(resolution, MAX_COORDINATE) and resolution > 0.0):
-        problems.append(Problem("resolution", resolution, "the side of a cell, a number above 0 [m]"))
+    if not (is_number(resolution, MAX_COORDINATE) and resolution >= SMALLEST):
+        problems.append(Problem("resolution", resolution, A_SIDE))
     pose = origin.tolist() if isinstance(origin, np.ndarray) else origin
     values = list(pose) if isinstance(pose, Sequence) and not isinstance(pose, str) else []
     if len(values) != 3 or not all(is_number(value, MAX_COORDINATE) for value in values):

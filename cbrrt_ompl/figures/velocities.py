@@ -13,9 +13,17 @@ from cbrrt_ompl.figures.style import COMMAND_COLOR, PATH_COLOR, TURN_COLOR
 from cbrrt_ompl.problem.robot import Limits
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 
+MOST_DOTS = 40
+"""Dots along a curve: more of them hide it."""
+
+PERIODS = tuple(factor * 10**power for power in range(12) for factor in (1, 2, 5))
+"""Times between two dots [s]."""
+
 
 def draw_velocities(axes: Sequence[Axes], trajectory: Trajectory, limits: Limits | None) -> Sequence[Axes]:
     """Draw both velocities over time with their commands and limits, a dot every second, as in the paper's Fig. 6.
+
+    Of a long trajectory every second, fifth, tenth, ... second has one.
 
     Args:
         axes: axes for v [m/s] and for omega [deg/s].
@@ -25,7 +33,8 @@ def draw_velocities(axes: Sequence[Axes], trajectory: Trajectory, limits: Limits
     Returns:
         The axes.
     """
-    seconds = trajectory.t[0] + np.arange(math.floor(trajectory.duration) + 1)
+    period = next(period for period in PERIODS if trajectory.duration <= MOST_DOTS * period)
+    seconds = trajectory.t[0] + np.arange(0, math.floor(trajectory.duration) + 1, period)
     dots = trajectory.at(np.minimum(seconds, trajectory.t[-1]))
     for ax, name, column, unit, label in (
         (axes[0], "v", 3, 1.0, "v [m/s]"),
@@ -44,7 +53,7 @@ def draw_velocities(axes: Sequence[Axes], trajectory: Trajectory, limits: Limits
             markersize=3.2,
             markerfacecolor=TURN_COLOR,
             markeredgewidth=0.0,
-            label="every second",
+            label="every second" if period == 1 else f"every {period:,} s",
         )
         shown = np.array([*ends, values.min(), commands.min(), values.max(), commands.max()])
         margin = 0.12 * float(np.ptp(ends or shown)) or 0.1

@@ -117,12 +117,12 @@ def _robot_of(data: object, report: Report) -> Nav2Robot:
     costmaps = sorted(sections, key=lambda entry: ("global_costmap" in entry[0]) - ("local_costmap" in entry[0]))
     checkers = [section for _, section in sections]
     goal = {
-        "tolerance": _first(checkers, ["xy_goal_tolerance"]),
-        "heading_tolerance": _first(checkers, ["yaw_goal_tolerance"]),
+        "tolerance": _first(checkers, ["xy_goal_tolerance"], report),
+        "heading_tolerance": _first(checkers, ["yaw_goal_tolerance"], report),
     }
     return Nav2Robot(
         _footprint_of(costmaps, report),
-        _limits_of([section for _, section in controllers]),
+        _limits_of([section for _, section in controllers], report),
         {name: value for name, value in goal.items() if value is not None},
     )
 
@@ -140,16 +140,24 @@ def _sections(data: object, path: str) -> Iterator[tuple[str, Mapping[Any, Any]]
             yield from _sections(value, f"{path}.{name}")
 
 
-def _first(sections: list[Mapping[Any, Any]], names: list[str] | tuple[str, ...]) -> float | None:
-    """The first number that sections have under one of some names."""
-    return next((float(s[name]) for s in sections for name in names if name in s and is_number(s[name])), None)
+def _first(sections: list[Mapping[Any, Any]], names: list[str] | tuple[str, ...], report: Report) -> float | None:
+    """The first value that sections have under one of some names; what is no number is reported."""
+    for section in sections:
+        for name in names:
+            value = section.get(name)
+            if is_number(value):
+                return float(value)
+            if value is not None:
+                report.add(name, value, "a finite number")
+                return None
+    return None
 
 
-def _limits_of(sections: list[Mapping[Any, Any]]) -> dict[str, float]:
+def _limits_of(sections: list[Mapping[Any, Any]], report: Report) -> dict[str, float]:
     """The limits of a file, by their names in `Limits`."""
     sections = [section | _smoother(section) for section in map(dict, sections)]
-    fastest, slowest, back = (_first(sections, names) for names in (FASTEST, SLOWEST, FASTEST_BACKWARDS))
-    turn = _first(sections, FASTEST_TURN)
+    fastest, slowest, back = (_first(sections, names, report) for names in (FASTEST, SLOWEST, FASTEST_BACKWARDS))
+    turn = _first(sections, FASTEST_TURN, report)
     if back is not None:
         slowest = -abs(back)
     found = {
@@ -157,21 +165,28 @@ def _limits_of(sections: list[Mapping[Any, Any]]) -> dict[str, float]:
         "v_min": None if fastest is None else min(slowest or 0.0, 0.0),
         "omega_max": None if turn is None else abs(turn),
         "omega_min": None if turn is None else -abs(turn),
-        **_changes(sections, "acceleration", ACCELERATION, "deceleration", DECELERATION),
-        **_changes(sections, "angular_acceleration", TURN_ACCELERATION, "angular_deceleration", TURN_DECELERATION),
+        **_changes(sections, "acceleration", ACCELERATION, "deceleration", DECELERATION, report),
+        **_changes(
+            sections, "angular_acceleration", TURN_ACCELERATION, "angular_deceleration", TURN_DECELERATION, report
+        ),
     }
     return {name: value for name, value in found.items() if value is not None}
 
 
 def _changes(
-    sections: list[Mapping[Any, Any]], faster: str, up: tuple[str, ...], slower: str, down: tuple[str, ...]
+    sections: list[Mapping[Any, Any]],
+    faster: str,
+    up: tuple[str, ...],
+    slower: str,
+    down: tuple[str, ...],
+    report: Report,
 ) -> dict[str, float]:
     """Acceleration and deceleration of the first section that has one, under two names, the latter if it differs.
 
     The sign is a matter of taste, and 0 is taken for none.
     """
     for section in sections:
-        gain, loss = (abs(_first([section], names) or 0.0) for names in (up, down))
+        gain, loss = (abs(_first([section], names, report) or 0.0) for names in (up, down))
         if gain or loss:
             return {faster: gain or loss} | ({slower: loss} if gain and loss and gain != loss else {})
     return {}

@@ -18,7 +18,7 @@ from typing import Any
 import yaml
 
 from cbrrt_ompl.errors import InputError, Problem, Remark
-from cbrrt_ompl.files import refusal
+from cbrrt_ompl.files import note_read, refusal
 
 MAX_FILE_SIZE = 16 * 2**20
 """Largest file that is read [bytes]."""
@@ -57,6 +57,7 @@ def read_yaml(path: Path, problems: list[Problem]) -> object:
     Raises:
         InputError: if the file cannot be read, or is no YAML of the kind described above.
     """
+    note_read(path)
     try:
         with path.open("rb") as file:
             content = file.read(MAX_FILE_SIZE + 1)

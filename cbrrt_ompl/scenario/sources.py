@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from cbrrt_ompl.errors import MISSING, InputError, MapError, Problem, Remark, ScenarioError
-from cbrrt_ompl.files import refusal
+from cbrrt_ompl.files import note_read, refusal
 from cbrrt_ompl.scenario.maps.formats import format_of
 from cbrrt_ompl.scenario.maps.map_files import MAP_SERVER_KEYS, ROS_SUFFIXES, find_beside
 from cbrrt_ompl.scenario.plain_yaml import read_yaml
@@ -147,6 +147,7 @@ def _read_scen(path: Path, number: int) -> Source:
 
 def _scen_line(path: Path, number: int) -> tuple[str, list[str]]:
     """Where a problem stands, and its columns."""
+    note_read(path)
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, ValueError) as error:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cbrrt_ompl.collision.occupancy import OCCUPIED
 from cbrrt_ompl.errors import MISSING, MapError, Problem, Remark
-from cbrrt_ompl.files import as_path
+from cbrrt_ompl.files import as_path, note_read
 from cbrrt_ompl.scenario.maps.formats import format_of, map_suffixes
 from cbrrt_ompl.scenario.maps.occupancy_map import OccupancyMap
 
@@ -38,6 +38,7 @@ def load_map(
         MapError: if it cannot be read, in one line a mistake, or if every cell is occupied.
     """
     path = as_path(path, MapError)
+    note_read(path)
     kind = format_of(path)
     if kind is None:
         expected = f"one of {', '.join(map_suffixes())}"

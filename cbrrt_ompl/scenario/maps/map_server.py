@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cbrrt_ompl.checks import is_number
-from cbrrt_ompl.collision.occupancy import FREE, FREE_THRESHOLD, OCCUPIED, OCCUPIED_THRESHOLD, UNKNOWN
+from cbrrt_ompl.checks import LARGEST, SMALLEST, is_number
+from cbrrt_ompl.collision.occupancy import A_SIDE, FREE, FREE_THRESHOLD, OCCUPIED, OCCUPIED_THRESHOLD, UNKNOWN
 from cbrrt_ompl.errors import MISSING, InputError, MapError, Problem
 from cbrrt_ompl.files import write_files
 from cbrrt_ompl.scenario.maps.image import MODES, UNKNOWN_GREY, Reading, cells_of
@@ -104,9 +104,9 @@ def _is_image(file: Path) -> bool:
 
 def _resolution(data: Mapping[object, object], problems: list[Problem]) -> float | None:
     value = data.get("resolution", MISSING)
-    if is_number(value) and value > 0.0:
+    if is_number(value, LARGEST) and value >= SMALLEST:
         return float(value)
-    problems.append(Problem("resolution", value, "the side of a cell, a number above 0 [m]"))
+    problems.append(Problem("resolution", value, A_SIDE))
     return None
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cbrrt_ompl.collision.occupancy import check_cell_count
 from cbrrt_ompl.errors import MapError, Problem, Remark
-from cbrrt_ompl.files import refusal
+from cbrrt_ompl.files import note_read, refusal
 from cbrrt_ompl.scenario.maps.pnm import open_straight
 
 FORMATS = ("PNG", "PPM", "BMP", "JPEG", "GIF", "TIFF")
@@ -45,6 +45,7 @@ def read_pixels(path: Path) -> Pixels:
     from PIL import Image  # here, since scenarios without a map need none
 
     source = str(path)
+    note_read(path)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # Pillow warns of large images, which are checked here

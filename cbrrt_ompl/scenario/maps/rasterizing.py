@@ -6,11 +6,11 @@ import math
 from pathlib import Path
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
-from cbrrt_ompl.checks import is_number
-from cbrrt_ompl.collision.occupancy import FREE, OCCUPIED, check_cell_count
+from cbrrt_ompl.checks import LARGEST, SMALLEST, is_number
+from cbrrt_ompl.collision.convex import convex_parts
+from cbrrt_ompl.collision.occupancy import A_SIDE, FREE, OCCUPIED, check_cell_count
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import MapError, Problem
 from cbrrt_ompl.problem.obstacles import Box, Disc, Obstacle
@@ -18,9 +18,6 @@ from cbrrt_ompl.scenario.maps.occupancy_map import OccupancyMap
 
 SLACK = 1e-6
 """Share of a cell's side that an obstacle must reach into it: less is rounding, or touching."""
-
-_BLOCK = 1_000_000
-"""Cells that are tested at a time."""
 
 
 def save_map(world: World, path: str | Path, resolution: float) -> None:
@@ -49,8 +46,8 @@ def rasterize(world: World, resolution: float) -> OccupancyMap:
     """
     if not isinstance(world, World):
         raise MapError(Problem("world", world, "a value of type World"))
-    if not (is_number(resolution) and resolution > 0.0):
-        raise MapError(Problem("resolution", resolution, "the side of a cell, a number above 0 [m]"))
+    if not (is_number(resolution, LARGEST) and resolution >= SMALLEST):
+        raise MapError(Problem("resolution", resolution, A_SIDE))
     columns, rows = (max(side / resolution, 1.0) for side in world.bounds.size)
     if columns * rows < math.inf:
         columns, rows = math.ceil(columns - SLACK), math.ceil(rows - SLACK)
@@ -78,22 +75,51 @@ def _draw(occupied: NDArray[np.bool_], obstacle: Obstacle, x0: float, y0: float,
     if isinstance(obstacle, Box):
         occupied[bottom:top, left:right] = True
         return
-    shape = None if isinstance(obstacle, Disc) else obstacle.to_shapely()
-    if shape is not None:
-        shapely.prepare(shape)
-    x = x0 + resolution * (np.arange(left, right) + SLACK)
-    inset = resolution * (1.0 - 2.0 * SLACK)
-    step = max(_BLOCK // (right - left), 1)
-    for first in range(bottom, top, step):
-        y = y0 + resolution * (np.arange(first, min(first + step, top)) + SLACK)
-        x_low, y_low = np.meshgrid(x, y)  # (rows, columns)
-        if isinstance(obstacle, Disc):
-            dx = np.clip(obstacle.center[0], x_low, x_low + inset) - obstacle.center[0]
-            dy = np.clip(obstacle.center[1], y_low, y_low + inset) - obstacle.center[1]
-            reached = np.hypot(dx, dy) <= obstacle.radius
-        else:
-            reached = shapely.intersects(shape, shapely.box(x_low, y_low, x_low + inset, y_low + inset))
-        occupied[first : first + len(y), left:right] |= reached
+    low = y0 + resolution * (np.arange(bottom, top) + SLACK)
+    high = low + resolution * (1.0 - 2.0 * SLACK)
+    if isinstance(obstacle, Disc):
+        extents = [_extent_of_disc(obstacle, low, high)]
+    else:
+        extents = [_extent_of_ring(ring, low, high) for ring in convex_parts(obstacle.to_shapely())]
+    for least, most in extents:
+        is_reached = least <= most
+        first = np.ceil((least[is_reached] - x0) / resolution - 1.0 + SLACK).clip(left, right).astype(int)
+        end = np.floor((most[is_reached] - x0) / resolution + 1.0 - SLACK).clip(left, right).astype(int)
+        rows = bottom + np.flatnonzero(is_reached)
+        for row, start, stop in zip(rows.tolist(), first.tolist(), end.tolist(), strict=True):
+            occupied[row, start:stop] = True
+
+
+def _extent_of_disc(
+    disc: Disc, low: NDArray[np.float64], high: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """See :func:`_extent_of_ring`."""
+    x, y = disc.center
+    rest = disc.radius**2 - (np.clip(y, low, high) - y) ** 2
+    half = np.where(rest >= 0.0, np.sqrt(np.maximum(rest, 0.0)), -np.inf)
+    return x - half, x + half
+
+
+def _extent_of_ring(
+    ring: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Least and largest x of a convex polygon between two heights; the least is above the largest where it has none.
+
+    Args:
+        ring: corners, shape (n, 2) [m].
+        low: lower heights, shape (m,) [m].
+        high: upper heights, shape (m,) [m].
+
+    Returns:
+        The least and the largest x, each of shape (m,) [m].
+    """
+    (ax, ay), (bx, by) = (corners.T[:, :, None] for corners in (ring, np.roll(ring, -1, axis=0)))  # (n, 1) each
+    bottom, top = np.maximum(np.minimum(ay, by), low), np.minimum(np.maximum(ay, by), high)  # (n, m)
+    rise = np.where(by == ay, 1.0, by - ay)
+    ends = [np.clip(ax + (y - ay) * ((bx - ax) / rise), np.minimum(ax, bx), np.maximum(ax, bx)) for y in (bottom, top)]
+    is_there = bottom <= top
+    least = np.where(is_there, np.minimum(*ends), np.inf).min(axis=0)
+    return least, np.where(is_there, np.maximum(*ends), -np.inf).max(axis=0)
 
 
 def _rectangle_around(obstacle: Obstacle) -> tuple[float, float, float, float]:
