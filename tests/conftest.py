@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -31,6 +32,15 @@ def _compiled_kernels() -> None:
     from cbrrt_ompl.planning import warm_up_planner
 
     warm_up_planner("cb-rrt" if has_ompl() else "cb-rrt-compiled")
+
+
+@pytest.fixture
+def quiet_ompl() -> Iterator[None]:
+    """Keep OMPL's log out of the tests' output."""
+    from cbrrt_ompl.ompl_plugin import run
+
+    with run.quiet_ompl():
+        yield
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

@@ -24,8 +24,10 @@ from cbrrt_ompl.problem.robot import Footprint, Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 
 if has_ompl():
+    from ompl_rounds import solve
+
     from cbrrt_ompl.ompl_plugin import native_layout, native_space, self_check
-    from cbrrt_ompl.ompl_plugin.binding import ob, oc, ou
+    from cbrrt_ompl.ompl_plugin.binding import ob, oc
     from cbrrt_ompl.ompl_plugin.compiled_methods import VARIABLE, compiled_methods_work, use_compiled_methods
     from cbrrt_ompl.ompl_plugin.native_layout import LayoutError, object_address, vtable_address, words_at
     from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
@@ -36,21 +38,15 @@ else:
 UNLESS_OFF = pytest.mark.skipif(
     os.environ.get("CBRRT_OMPL_COMPILED_METHODS") == "0", reason="CBRRT_OMPL_COMPILED_METHODS=0 switches them off"
 )
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the wheel hides the symbols")
+pytestmark = [
+    pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the wheel hides the symbols"),
+    pytest.mark.usefixtures("quiet_ompl"),
+]
 
 WORLD = World(Bounds((0.0, 0.0), (10.0, 10.0)), [Box((4.8, 0.0), (5.0, 6.0)), Box((2.0, 7.0), (3.0, 7.2))])
 EASY = Scenario(name="easy", world=WORLD, start=State(2.0, 2.0), goal=Goal(8.0, 8.0, tolerance=0.8))
 RECTANGLE = Robot(Footprint.polygon([(-0.2, -0.15), (0.2, -0.15), (0.2, 0.15), (-0.2, 0.15)]))
 IN_OMPL = [name for name, planner in PLANNERS.items() if planner.backend is not Backend.COMPILED]
-
-
-@pytest.fixture(autouse=True)
-def quiet() -> Iterator[None]:
-    """Keep OMPL's log out of the tests' output."""
-    level = ou.getLogLevel()
-    ou.setLogLevel(ou.LOG_NONE)
-    yield
-    ou.setLogLevel(level)
 
 
 @pytest.fixture
@@ -155,8 +151,7 @@ def test_a_derived_class_that_overrides_a_method_is_asked(method: str) -> None:
         setup.setStatePropagator(Propagator(si, EASY.robot))
     else:
         setup.setStateValidityChecker(Checker(si, EASY.robot, WORLD))
-    left = iter(range(10))
-    setup.solve(ob.PlannerTerminationCondition(ob.PlannerTerminationConditionFn(lambda: next(left, None) is None)))
+    solve(setup, 10)
     assert len(calls) > 10
 
 

@@ -7,7 +7,6 @@ import math
 import os
 import random
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -30,6 +29,8 @@ from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.scenario.scenario import Scenario
 
 if has_ompl():
+    from ompl_rounds import solve
+
     from cbrrt_ompl.ompl_plugin.binding import ob, oc, ou
     from cbrrt_ompl.ompl_plugin.goals import PoseGoal, make_goal
     from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
@@ -49,6 +50,8 @@ if has_ompl():
 else:
     pytest.skip("all of it needs OMPL", allow_module_level=True)
 
+pytestmark = pytest.mark.usefixtures("quiet_ompl")
+
 BOUNDS = Bounds((0.0, 0.0), (10.0, 10.0))
 EASY = Scenario(
     name="easy",
@@ -61,15 +64,6 @@ EASY = Scenario(
 PAPER_PLANNERS = [name for name, planner in PLANNERS.items() if planner.backend is Backend.PLUGIN]
 OTHER_PLANNERS = [name for name, planner in PLANNERS.items() if planner.backend is not Backend.PLUGIN]
 ALL_PLANNERS = list(PLANNERS)
-
-
-@pytest.fixture(autouse=True)
-def quiet() -> Iterator[None]:
-    """Keep OMPL's log out of the tests' output."""
-    level = ou.getLogLevel()
-    ou.setLogLevel(ou.LOG_NONE)
-    yield
-    ou.setLogLevel(level)
 
 
 @pytest.fixture
@@ -105,15 +99,6 @@ def deviation(space: Any, state: Any, other: Any) -> float:
     difference = reals(space, state) - reals(space, other)
     difference[2] = math.remainder(difference[2], math.tau)
     return float(np.abs(difference).max())
-
-
-def solve(setup: Any, rounds: int, seed: int = 1) -> Any:
-    """Solve until solved or for a number of rounds of the planner's main loop."""
-    ou.RNG.setSeed(seed)
-    left = iter(range(rounds))
-    return setup.solve(
-        ob.PlannerTerminationCondition(ob.PlannerTerminationConditionFn(lambda: next(left, None) is None))
-    )
 
 
 # what OMPL stores replays

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -37,10 +37,14 @@ from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.scenario.scenario import Scenario
 
 if has_ompl():
+    from ompl_rounds import solve
+
     from cbrrt_ompl.ompl_plugin.binding import ob, oc, ou
     from cbrrt_ompl.ompl_plugin.setup import make_planner
 else:
     pytest.skip("all of it needs OMPL", allow_module_level=True)
+
+pytestmark = pytest.mark.usefixtures("quiet_ompl")
 
 OPEN = Scenario(name="open", world=World(Bounds((-5.0, -5.0), (5.0, 5.0))), start=State(-4.0, 0.0), goal=Goal(4.0, 0.0))
 BY_VELOCITIES = replace(OPEN, planning=PlanningSettings(closed_loop=False))
@@ -52,24 +56,6 @@ MOST = [*OURS, "rrt", "est"]
 """All of ours, and two of OMPL's for comparison."""
 
 Part = Callable[[Any], Any]
-
-
-@pytest.fixture(autouse=True)
-def quiet() -> Iterator[None]:
-    """Keep OMPL's log out of the tests' output."""
-    level = ou.getLogLevel()
-    ou.setLogLevel(ou.LOG_NONE)
-    yield
-    ou.setLogLevel(level)
-
-
-def solve(setup: Any, rounds: int = 20_000, seed: int = 1) -> str:
-    """Solve until solved or for a number of rounds; the status in words."""
-    ou.RNG.setSeed(seed)
-    left = iter(range(rounds))
-    stop = ob.PlannerTerminationConditionFn(lambda: next(left, None) is None)
-    status: str = setup.solve(ob.PlannerTerminationCondition(stop)).asString()
-    return status
 
 
 def scoped(setup: Any, *values: float) -> Any:

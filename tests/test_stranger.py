@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -29,9 +29,13 @@ from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.scenario.scenario import Scenario
 
 if has_ompl():
+    from ompl_rounds import solve
+
     from cbrrt_ompl.ompl_plugin.binding import ob, oc, og, ou
 else:
     pytest.skip("all of it needs OMPL", allow_module_level=True)
+
+pytestmark = pytest.mark.usefixtures("quiet_ompl")
 
 ROBOT = Robot()
 WORLD = World(Bounds((-5.0, -5.0), (5.0, 5.0)), [Box((-0.5, -5.0), (0.5, 3.0))])
@@ -47,15 +51,6 @@ OF_OMPL = ["RRT", "EST", "KPIECE1", "SST", "PDST"]
 NODES = 0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15)
 WEIGHTS = 5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0
 """Gauss-Legendre quadrature on [0, 1]."""
-
-
-@pytest.fixture(autouse=True)
-def quiet() -> Iterator[None]:
-    """Keep OMPL's log out of the tests' output."""
-    level = ou.getLogLevel()
-    ou.setLogLevel(ou.LOG_NONE)
-    yield
-    ou.setLogLevel(level)
 
 
 # the stranger's own classes
@@ -164,17 +159,10 @@ class SetUp:
             self.setup.setOptimizationObjective(objective)
 
     def solve(self, rounds: int) -> str:
-        return solve(self.setup, rounds)
+        return solve(self.setup, rounds, seed=None)
 
     def path(self) -> list[list[float]]:
         return matrix(self.setup.getSolutionPath())
-
-
-def solve(setup: Any, rounds: int) -> str:
-    left = iter(range(rounds))
-    condition = ob.PlannerTerminationConditionFn(lambda: next(left, None) is None)
-    status: str = setup.solve(ob.PlannerTerminationCondition(condition)).asString()
-    return status
 
 
 def matrix(path: Any) -> list[list[float]]:
@@ -445,7 +433,7 @@ def without_controls(a: SetUp) -> Any:
     setup.setStateValidityChecker(a.checker(setup.getSpaceInformation()))
     setup.setStartAndGoalStates(a.state(-4.0, -4.0), a.state(4.0, -4.0), 0.05)
     setup.setPlanner(og.RRTConnect(setup.getSpaceInformation()))
-    return solve(setup, 3000), matrix(setup.getSolutionPath()), setup.getSolutionPath().check()
+    return solve(setup, 3000, seed=None), matrix(setup.getSolutionPath()), setup.getSolutionPath().check()
 
 
 SCRIPT: list[Callable[[SetUp], Any]] = [
@@ -563,7 +551,7 @@ def test_a_state_sampler_of_ones_own_is_obeyed_by_the_others(planner: str) -> No
     setup = make_setup(SCENARIO, planner)
     setup.getStateSpace().setStateSamplerAllocator(ob.StateSamplerAllocator(Corner))
     setup.getPlanner().setGoalBias(0.0)
-    solve(setup, 60)
+    solve(setup, 60, seed=None)
     path = setup.getSolutionPath()
     assert path.getState(path.getStateCount() - 1)[0][0] < 0.0  # towards the corner the wall is in the way
 
@@ -581,7 +569,7 @@ def test_intermediate_states_may_be_nodes(planner: str) -> None:
     ou.RNG.setSeed(3)
     setup = make_setup(SCENARIO, planner)
     setup.getPlanner().setIntermediateStates(True)
-    assert solve(setup, 5000) == "Exact solution"
+    assert solve(setup, 5000, seed=None) == "Exact solution"
     path = setup.getSolutionPath()
     assert path.check() and set(path.getControlDurations()) == {SCENARIO.planning.step}
     trajectory = trajectory_from_path(path, SCENARIO)
