@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.collision.pieces import RECTANGLE, Pieces, obstacle_pieces
+from cbrrt_ompl.collision.pieces import DISC, RECTANGLE, Pieces, join, obstacle_pieces
 from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.motion.records import Record, Records, record_array
 from cbrrt_ompl.problem.obstacles import Disc, Obstacle
@@ -92,15 +92,10 @@ class Sight:
         Args:
             obstacles: all that blocks the sight, known or not.
         """
-        parts = [_shapes(obstacle_pieces([obstacle])) for obstacle in obstacles]
-        counts = [len(shapes) for shapes, _ in parts]
+        parts = [obstacle_pieces([obstacle]) for obstacle in obstacles]
+        counts = np.array([len(part.pieces) for part in parts], dtype=int)
         self._owner = np.repeat(np.arange(len(parts)), counts)  # obstacle of each shape
-        self._shapes = record_array(int(np.sum(counts, dtype=int)), SHAPE)
-        self._corners = np.concatenate([np.empty((0, 2)), *(corners for _, corners in parts)])
-        firsts = np.cumsum([0, *(len(corners) for _, corners in parts)])[:-1]
-        for place, (shapes, _), first in zip(np.cumsum([0, *counts])[:-1], parts, firsts, strict=True):
-            shapes["first"] += first
-            self._shapes[place : place + len(shapes)] = shapes
+        self._shapes, self._corners = _shapes(join(parts))
         self._obstacles = len(parts)
 
     def look(self, x: float, y: float, sensor_range: float) -> View:
@@ -136,21 +131,21 @@ def warm_up() -> None:
 
 
 def _shapes(parts: Pieces) -> tuple[Records, NDArray[np.float64]]:
-    """Convex pieces as discs and rings of corners, and these corners, shape (m, 2)."""
+    """Convex pieces as discs and rings of corners, and these corners, shape (m, 2) [m]."""
     pieces = parts.pieces
-    shapes = np.zeros(len(pieces), dtype=SHAPE)
-    shapes["x"], shapes["y"] = pieces["x"], pieces["y"]
-    corners = np.column_stack([parts.corners["x"], parts.corners["y"]])
-    shapes["first"], shapes["count"] = pieces["first"], pieces["count"]
-    for i, piece in enumerate(pieces):
-        if piece["kind"] == RECTANGLE:
-            side = np.array([piece["cos"], piece["sin"]])
-            a, b = piece["half_x"] * side, piece["half_y"] * np.array([-side[1], side[0]])
-            shapes[i]["first"], shapes[i]["count"] = len(corners), 4
-            corners = np.concatenate([corners, (piece["x"], piece["y"]) + np.array([-a - b, a - b, a + b, b - a])])
-        elif piece["count"] == 0:
-            shapes[i]["radius"] = piece["half_x"]
-    return shapes, corners
+    shapes = record_array(len(pieces), SHAPE)
+    for name in ("first", "count", "x", "y"):
+        shapes[name] = pieces[name]
+    is_disc, is_rectangle = pieces["kind"] == DISC, pieces["kind"] == RECTANGLE
+    shapes["radius"][is_disc] = pieces["half_x"][is_disc]
+    boxes = pieces[is_rectangle]
+    a = boxes["half_x"] * [boxes["cos"], boxes["sin"]]  # (2, n)
+    b = boxes["half_y"] * [-boxes["sin"], boxes["cos"]]
+    outlines = [boxes["x"], boxes["y"]] + np.array([-a - b, a - b, a + b, b - a])  # (4, 2, n)
+    shapes["first"][is_rectangle] = len(parts.corners) + 4 * np.arange(len(boxes))
+    shapes["count"][is_rectangle] = 4
+    own_corners = np.column_stack([parts.corners["x"], parts.corners["y"]])
+    return shapes, np.concatenate([own_corners, outlines.transpose(2, 0, 1).reshape(-1, 2)])
 
 
 def _rays(edges: NDArray[np.float64], nearest: NDArray[np.float64]) -> NDArray[np.float64]:
