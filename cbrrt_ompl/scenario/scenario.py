@@ -14,6 +14,7 @@ from cbrrt_ompl.files import as_path, write_file
 from cbrrt_ompl.problem.robot import Limits, Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.scenario.map_layers import MapSource
+from cbrrt_ompl.scenario.plain_yaml import dump_line
 from cbrrt_ompl.scenario.scenario_file import read_parts, scenario_data
 from cbrrt_ompl.scenario.sections import Report
 from cbrrt_ompl.scenario.sources import Source, read_source
@@ -50,7 +51,7 @@ class Scenario(Shown):
     def __post_init__(self) -> None:
         """Check that the parts fit each other."""
         _check_types(self)
-        problems = find_problems({field.name: getattr(self, field.name) for field in fields(self)})
+        problems = find_problems(parts_of(self))
         if problems:
             raise ScenarioError(problems)
         object.__setattr__(self, "start", State(*map(float, self.start)))
@@ -74,6 +75,11 @@ class Scenario(Shown):
     def _key(self) -> tuple[Any, ...]:
         world = (self.world.bounds, self.world.obstacles)
         return self.name, world, self.robot, self.start, self.goal, self.planning, self.map
+
+
+def parts_of(scenario: Scenario) -> dict[str, Any]:
+    """The attributes of a scenario by name."""
+    return {field.name: getattr(scenario, field.name) for field in fields(scenario)}
 
 
 def check_scenario(value: object) -> None:
@@ -113,8 +119,6 @@ def save_scenario(scenario: Scenario, path: str | Path) -> None:
     Raises:
         ScenarioError: if the file cannot be written.
     """
-    from cbrrt_ompl.scenario.plain_yaml import dump_line
-
     check_scenario(scenario)
     lines = []
     path = as_path(path, ScenarioError)
@@ -157,7 +161,7 @@ def scenario_to_dict(scenario: Scenario, folder: Path | None = None) -> dict[str
         Mappings, lists, texts and numbers that :func:`scenario_from_dict` makes an equal scenario of.
     """
     check_scenario(scenario)
-    return scenario_data(scenario, (Path() if folder is None else as_path(folder, ScenarioError)).resolve())
+    return scenario_data(parts_of(scenario), (Path() if folder is None else as_path(folder, ScenarioError)).resolve())
 
 
 def find_problems(parts: Mapping[str, Any]) -> list[Problem]:

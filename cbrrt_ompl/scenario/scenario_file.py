@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import MISSING
@@ -36,9 +36,6 @@ from cbrrt_ompl.scenario.sections import (
     text,
     whole_number,
 )
-
-if TYPE_CHECKING:
-    from cbrrt_ompl.scenario.scenario import Scenario
 
 
 def read_parts(data: object, folder: Path, report: Report) -> dict[str, Any]:
@@ -69,29 +66,29 @@ def read_parts(data: object, folder: Path, report: Report) -> dict[str, Any]:
     return {name: value for name, value in found.items() if value is not None}
 
 
-def scenario_data(scenario: Scenario, folder: Path) -> dict[str, Any]:
+def scenario_data(parts: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Plain value of a scenario, from which :func:`read_parts` reads equal parts.
 
     Args:
-        scenario: what to write.
+        parts: all attributes of the scenario by name.
         folder: what the map's file is to be relative to.
 
     Returns:
         Mappings, lists, texts and numbers, angles in radians.
     """
-    world, source = scenario.world, scenario.map
+    world, source = parts["world"], parts["map"]
     data: dict[str, Any] = {
-        "name": scenario.name,
+        "name": parts["name"],
         "bounds": _box_data(world.bounds),
         "obstacles": [_obstacle_data(o) for o in world.obstacles[source.obstacles if source else 0 :]],
     }
     if source is not None:
         data["map"] = source_data(source, folder)
     return data | {
-        "robot": robot_data(scenario.robot),
-        "start": {name: float(value) for name, value in scenario.start._asdict().items()},
-        "goal": _goal_data(scenario.goal),
-        "planning": _planning_data(scenario.planning),
+        "robot": robot_data(parts["robot"]),
+        "start": {name: float(value) for name, value in parts["start"]._asdict().items()},
+        "goal": _goal_data(parts["goal"]),
+        "planning": _planning_data(parts["planning"]),
     }
 
 

@@ -6,7 +6,6 @@ import glob
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,9 +17,6 @@ from cbrrt_ompl.scenario.maps.image import MODES, UNKNOWN_GREY, Reading, cells_o
 from cbrrt_ompl.scenario.maps.map_files import IMAGE_SUFFIXES, MapFile, find_beside
 from cbrrt_ompl.scenario.maps.pixels import read_pixels
 from cbrrt_ompl.scenario.plain_yaml import dump_line, read_yaml
-
-if TYPE_CHECKING:
-    from cbrrt_ompl.scenario.maps.occupancy_map import OccupancyMap
 
 _GREYS = {OCCUPIED: 0, FREE: 254, UNKNOWN: UNKNOWN_GREY}
 """What map_saver writes."""
@@ -59,8 +55,16 @@ def read_map_server(path: Path) -> MapFile:
     return MapFile(cells_of(read_pixels(image), reading), resolution, origin, tuple(remarks))
 
 
-def write_map_server(grid: OccupancyMap, path: Path) -> None:
-    """Write a map; see :meth:`cbrrt_ompl.scenario.maps.OccupancyMap.save`."""
+def write_map_server(grid: MapFile, path: Path) -> None:
+    """Write a map, from which :func:`read_map_server` reads the same cells, resolution and origin.
+
+    Args:
+        grid: what to write; its remarks are left out.
+        path: the YAML file; the image gets the same name with the suffix ``.pgm``.
+
+    Raises:
+        MapError: if the name has another suffix, or a file cannot be written.
+    """
     if path.suffix.lower() not in (".yaml", ".yml"):
         raise MapError(Problem("path", str(path), "a name that ends in .yaml"))
     image = path.with_suffix(".pgm")

@@ -28,6 +28,8 @@ from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import MapError, Problem, Remark
 from cbrrt_ompl.files import as_path
 from cbrrt_ompl.problem.obstacles import Bounds, Obstacle
+from cbrrt_ompl.scenario.maps.map_files import MapFile
+from cbrrt_ompl.scenario.maps.map_server import write_map_server
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,6 +160,4 @@ class OccupancyMap:
         Raises:
             MapError: if the name has another suffix, or a file cannot be written.
         """
-        from cbrrt_ompl.scenario.maps.map_server import write_map_server
-
-        write_map_server(self, as_path(path, MapError))
+        write_map_server(MapFile(self.cells, self.resolution, self.origin), as_path(path, MapError))
