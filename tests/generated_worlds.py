@@ -15,7 +15,7 @@ from cbrrt_ompl.errors import ScenarioError
 from cbrrt_ompl.planning import plan
 from cbrrt_ompl.problem.settings import State
 from cbrrt_ompl.scenario.scenario import Scenario, scenario_from_dict, scenario_to_dict
-from cbrrt_ompl.trajectory.trajectory import COLUMNS
+from cbrrt_ompl.trajectory.columns import COLUMNS
 from cbrrt_ompl.verification import verify
 
 Generator = np.random.Generator

@@ -25,7 +25,8 @@ from cbrrt_ompl.problem.ready_robots import rectangle
 from cbrrt_ompl.problem.robot import Limits, Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 from cbrrt_ompl.scenario.scenario import Scenario, scenario_from_dict, scenario_to_dict
-from cbrrt_ompl.trajectory.trajectory import COLUMNS, Trajectory
+from cbrrt_ompl.trajectory.columns import COLUMNS
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.verification import verify
 
 DT = 0.05

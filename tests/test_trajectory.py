@@ -20,7 +20,9 @@ from cbrrt_ompl.errors import InputError, TrajectoryError
 from cbrrt_ompl.planning import plan
 from cbrrt_ompl.problem.robot import Limits
 from cbrrt_ompl.scenario.scenario import load_scenario
-from cbrrt_ompl.trajectory.trajectory import COLUMNS, Trajectory, displacement, wrapped
+from cbrrt_ompl.trajectory.columns import COLUMNS
+from cbrrt_ompl.trajectory.displacement import displacement, wrapped
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.trajectory.tree import Tree
 from cbrrt_ompl.verification import verify
 

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.errors import MISSING, Problem, SettingsError, TrajectoryError
-from cbrrt_ompl.trajectory.trajectory import Trajectory, displacement, wrapped
+from cbrrt_ompl.trajectory.displacement import displacement, wrapped
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from cbrrt_ompl.problem.robot import Limits

@@ -23,7 +23,8 @@ from cbrrt_ompl.optimise.transcription import Transcription
 from cbrrt_ompl.problem.obstacles import Bounds, Box
 from cbrrt_ompl.problem.settings import Goal, State
 from cbrrt_ompl.scenario.scenario import Scenario, check_scenario
-from cbrrt_ompl.trajectory.trajectory import Trajectory, wrapped
+from cbrrt_ompl.trajectory.displacement import wrapped
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 
 TIME_LIMIT = 1.0
 """Time that :func:`improve` takes at most where nothing else is asked for [s]."""

@@ -14,8 +14,9 @@ import numpy as np
 from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.errors import MISSING, Problem, Remark, TrajectoryError
 from cbrrt_ompl.files import as_path, refusal
+from cbrrt_ompl.trajectory.columns import COLUMNS
 from cbrrt_ompl.trajectory.track import POSE_COLUMNS, VELOCITY_COLUMNS, Track, stamped_track
-from cbrrt_ompl.trajectory.trajectory import COLUMNS, Trajectory
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 
 DYNOBENCH_STEP = 0.1
 """Time step of dynobench's models, where a result tells nothing else [s]."""

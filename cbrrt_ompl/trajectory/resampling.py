@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,12 +18,15 @@ from numpy.typing import NDArray
 
 from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.errors import Problem, Remark, TrajectoryError
-from cbrrt_ompl.trajectory.trajectory import QUADRATURE, Trajectory, wrapped
+from cbrrt_ompl.trajectory.columns import COLUMNS
+from cbrrt_ompl.trajectory.displacement import QUADRATURE, wrapped
 
 if TYPE_CHECKING:
     from cbrrt_ompl.problem.robot import Limits
+    from cbrrt_ompl.trajectory.trajectory import Trajectory
 
 MOST_ROWS = 1_000_000
+"""Rows of a trajectory at most."""
 
 GAIN = 1.0
 """How fast an error is taken back [1/s]: slow enough to need little of the accelerations."""
@@ -80,7 +84,7 @@ def _refined(trajectory: Trajectory, times: NDArray[np.float64]) -> Trajectory:
     else:
         commands = np.concatenate([states[1:, 3:], states[-1:, 3:]])
         commands[-1] = commands[-2] if len(commands) > 1 else commands[-1]
-    return Trajectory(times, *states.T, *commands.T, kinematic=trajectory.kinematic, limits=trajectory.limits)
+    return _with_rows(trajectory, times, states, commands)
 
 
 def _followed(trajectory: Trajectory, times: NDArray[np.float64], step: float, limits: Limits | None) -> Trajectory:
@@ -110,9 +114,14 @@ def _followed(trajectory: Trajectory, times: NDArray[np.float64], step: float, l
     states: NDArray[np.float64] = np.array(rows)
     states[:, 2] = wrapped(states[:, 2])
     commands = np.concatenate([states[1:, 3:], states[-1:, 3:]])
-    return Trajectory(
-        np.array(stamps), *states.T, *commands.T, kinematic=trajectory.kinematic, limits=trajectory.limits
-    )
+    return _with_rows(trajectory, np.array(stamps), states, commands)
+
+
+def _with_rows(
+    trajectory: Trajectory, times: NDArray[np.float64], states: NDArray[np.float64], commands: NDArray[np.float64]
+) -> Trajectory:
+    """A trajectory of the same kind with other rows: times (n,), states (n, 5) and commands (n, 2)."""
+    return replace(trajectory, **dict(zip(COLUMNS, (times, *states.T, *commands.T), strict=True)))
 
 
 def _means(trajectory: Trajectory, times: NDArray[np.float64], step: float) -> NDArray[np.float64]:
@@ -166,10 +175,10 @@ def _next(
 def _moved(
     state: Sequence[float], begin: Sequence[float], end: Sequence[float], dt: float
 ) -> tuple[float, float, float]:
-    """Pose (x, y, theta) after a step, as :func:`cbrrt_ompl.trajectory.trajectory.displacement` has it."""
+    """Pose (x, y, theta) after a step, as :func:`cbrrt_ompl.trajectory.displacement.displacement` has it."""
     x, y, theta = state[:3]
-    for share, weight in _QUADRATURE:
-        heading = theta + dt * share * (begin[1] + 0.5 * (end[1] - begin[1]) * share)
-        way = dt * weight * (begin[0] + (end[0] - begin[0]) * share)
+    for node, weight in _QUADRATURE:
+        heading = theta + dt * node * (begin[1] + 0.5 * (end[1] - begin[1]) * node)
+        way = dt * weight * (begin[0] + (end[0] - begin[0]) * node)
         x, y = x + way * math.cos(heading), y + way * math.sin(heading)
     return x, y, theta + 0.5 * dt * (begin[1] + end[1])

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cbrrt_ompl.errors import Problem, Remark, TrajectoryError
-from cbrrt_ompl.trajectory.trajectory import wrapped
+from cbrrt_ompl.trajectory.displacement import wrapped
 
 POSE_COLUMNS = ("t", "x", "y", "theta")
 """The arrays of a track that must be there."""

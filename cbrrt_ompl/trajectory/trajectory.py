@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import io
-import json
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,13 +18,14 @@ from cbrrt_ompl.errors import MISSING, Problem, TrajectoryError
 from cbrrt_ompl.files import as_path, refusal, write_file
 from cbrrt_ompl.problem.settings import MAX_STEPS
 from cbrrt_ompl.shown import Shown
+from cbrrt_ompl.trajectory.columns import COLUMNS, column, column_problems
+from cbrrt_ompl.trajectory.displacement import displacement, wrapped
+from cbrrt_ompl.trajectory.formats import FORMATS
+from cbrrt_ompl.trajectory.resampling import resample
 
 if TYPE_CHECKING:
     from cbrrt_ompl.problem.robot import Limits
     from cbrrt_ompl.scenario.scenario import Scenario
-
-COLUMNS = ("t", "x", "y", "theta", "v", "omega", "v_command", "omega_command")
-"""The arrays of a trajectory, in the order of the CSV header."""
 
 EXPORTERS = {
     ".mcap": "cbrrt_ompl.export.ros_bag.write_bag",
@@ -40,9 +39,6 @@ STANDING_SPEED = 1e-6
 
 SMALLEST_POINT_TURN = math.radians(1.0)
 """Turns on the spot up to this are none [rad]."""
-
-QUADRATURE = np.transpose(np.polynomial.legendre.leggauss(8)) * 0.5 + (0.5, 0.0)
-"""Gauss-Legendre rule on [0, 1], exact for polynomials of degree 15: rows of (node, weight), shape (8, 2)."""
 
 
 class PointTurn(NamedTuple):
@@ -98,8 +94,8 @@ class Trajectory(Shown):
 
     def __post_init__(self) -> None:
         """Check, copy and freeze the arrays."""
-        arrays = {name: _array(name, getattr(self, name)) for name in COLUMNS}
-        problems = _problems(arrays, lambda name, row: f"{name}[{row}]")
+        arrays = {name: column(name, getattr(self, name)) for name in COLUMNS}
+        problems = column_problems(arrays, lambda name, row: f"{name}[{row}]")
         if problems:
             raise TrajectoryError(problems)
         if not isinstance(self.kinematic, bool | np.bool_):
@@ -188,7 +184,7 @@ class Trajectory(Shown):
         Raises:
             TrajectoryError: if a time is no number, or outside the trajectory.
         """
-        asked = _array("times", [times] if is_number(times) else times)
+        asked = column("times", [times] if is_number(times) else times)
         outside = ~((asked >= self.t[0]) & (asked <= (math.inf if self.ends_at_rest else self.t[-1])))
         if outside.any():
             expected = f"times from {self.t[0]:g} to {self.t[-1]:g} s"
@@ -202,8 +198,8 @@ class Trajectory(Shown):
         row = row[between]
         elapsed = asked[between] - self.t[row]
         v0, v1, w0, w1 = self.step_velocities[:, row]
-        share = elapsed / (self.t[row + 1] - self.t[row])
-        v, omega = v0 + (v1 - v0) * share, w0 + (w1 - w0) * share
+        fraction = elapsed / (self.t[row + 1] - self.t[row])
+        v, omega = v0 + (v1 - v0) * fraction, w0 + (w1 - w0) * fraction
         poses = self.poses[row] + displacement(self.theta[row], v0, v, w0, omega, elapsed)
         states[between] = np.column_stack([poses[:, :2], wrapped(poses[:, 2]), v, omega])
         return states
@@ -226,8 +222,6 @@ class Trajectory(Shown):
         Raises:
             TrajectoryError: if the rate is no number above 0, or makes more than a million rows.
         """
-        from cbrrt_ompl.trajectory.resampling import resample
-
         return resample(self, hz, self.limits if limits is None else limits)
 
     def stopping_at(self, t: float, limits: Limits | None = None, step: float | None = None) -> Trajectory:
@@ -310,8 +304,9 @@ class Trajectory(Shown):
             module, _, function = exporter.rpartition(".")
             getattr(import_module(module), function)(self, path, scenario)
             return
-        known = (*sorted(_FORMATS), *EXPORTERS)
-        write_file(path, _FORMATS[_suffix(path, known)].encode(self), TrajectoryError)
+        suffix = _known_suffix(path, (*sorted(FORMATS), *EXPORTERS))
+        columns = {name: getattr(self, name) for name in COLUMNS}
+        write_file(path, FORMATS[suffix].encode(columns, self.kinematic), TrajectoryError)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], kinematic: bool = False) -> Trajectory:
@@ -328,7 +323,7 @@ class Trajectory(Shown):
             TrajectoryError: if the file is missing, has another suffix or holds no trajectory.
         """
         path = as_path(path, TrajectoryError)
-        decode = _FORMATS[_suffix(path, sorted(_FORMATS))].decode
+        decode = FORMATS[_known_suffix(path, sorted(FORMATS))].decode
         try:
             content = path.read_bytes()
         except (OSError, ValueError) as error:
@@ -339,193 +334,17 @@ class Trajectory(Shown):
             raise TrajectoryError(error.problems, str(path)) from error
 
 
-def wrapped(angle: ArrayLike) -> NDArray[np.float64]:
-    """Angles brought to [-pi, pi), any shape [rad]."""
-    turned = np.mod(np.asarray(angle, dtype=float) + np.pi, 2.0 * np.pi) - np.pi
-    return np.where(turned >= np.pi, -np.pi, turned)  # the remainder of a tiny negative number rounds to 2 pi
-
-
-def displacement(
-    theta: NDArray[np.float64],
-    v: NDArray[np.float64],
-    v_end: NDArray[np.float64],
-    omega: NDArray[np.float64],
-    omega_end: NDArray[np.float64],
-    dt: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Change of pose over spans in which both velocities are linear in time; every argument has shape (n,).
-
-    The heading is exact; the position is a Gauss-Legendre quadrature of order 16.
+def _known_suffix(path: Path, known: Iterable[str]) -> str:
+    """The suffix of a file of one of the `FORMATS`, in lower case.
 
     Args:
-        theta: headings at the beginning [rad].
-        v: forward velocities at the beginning [m/s].
-        v_end: forward velocities at the end [m/s].
-        omega: turning rates at the beginning [rad/s].
-        omega_end: turning rates at the end [rad/s].
-        dt: durations [s].
-
-    Returns:
-        Changes of (x, y, theta), not wrapped, shape (n, 3) [m, m, rad].
-    """
-    share, weight = QUADRATURE.T[:, :, None]
-    heading = theta + dt * share * (omega + 0.5 * (omega_end - omega) * share)  # (8, n)
-    way = dt * weight * (v + (v_end - v) * share)  # (8, n)
-    turn = dt * 0.5 * (omega + omega_end)
-    return np.column_stack([(way * np.cos(heading)).sum(axis=0), (way * np.sin(heading)).sum(axis=0), turn])
-
-
-def _array(name: str, values: ArrayLike) -> NDArray[np.float64]:
-    """A copy of the values as floats.
-
-    Raises:
-        TrajectoryError: if they are no array of real numbers.
-    """
-    try:
-        array = np.asarray(values)
-    except ValueError:
-        array = np.empty(0, dtype=object)
-    if array.dtype.kind not in "fiu" or array.ndim != 1:
-        raise TrajectoryError(Problem(name, values, "a one-dimensional array of numbers"))
-    return array.astype(np.float64)
-
-
-def _problems(arrays: Mapping[str, NDArray[np.float64]], place: Callable[[str, int], str]) -> list[Problem]:
-    """What keeps the arrays from being a trajectory.
-
-    Args:
-        arrays: the columns by name, one-dimensional.
-        place: name for messages of the value in a column and a row.
-    """
-    rows = len(arrays["t"])
-    if rows == 0:
-        return [Problem("t", [], "at least one row")]
-    found = [
-        Problem(name, f"{len(array)} values", f"{rows} values, as many as t")
-        for name, array in arrays.items()
-        if len(array) != rows
-    ]
-    for name, array in arrays.items():
-        for row in np.flatnonzero(~np.isfinite(array))[:1]:
-            found.append(Problem(place(name, row), float(array[row]), "a finite number"))
-    if not found:
-        t = arrays["t"]
-        for row in np.flatnonzero(t[1:] <= t[:-1])[:1] + 1:
-            found.append(Problem(place("t", row), float(t[row]), f"a time above {float(t[row - 1])!r}, the one before"))
-    return found
-
-
-def _suffix(path: Path, known: Iterable[str]) -> str:
-    """The suffix in lower case.
+        path: the file.
+        known: what messages name.
 
     Raises:
         TrajectoryError: if no format has it.
     """
     suffix = path.suffix.lower()
-    if suffix not in _FORMATS:
+    if suffix not in FORMATS:
         raise TrajectoryError(Problem("suffix", path.suffix, f"one of {', '.join(known)}"), str(path))
     return suffix
-
-
-def _encode_csv(trajectory: Trajectory) -> bytes:
-    rows = np.column_stack([getattr(trajectory, name) for name in COLUMNS]).tolist()
-    lines = [",".join(COLUMNS), *(",".join(map(repr, row)) for row in rows)]
-    return ("\n".join(lines) + "\n").encode()
-
-
-def _decode_csv(content: bytes) -> dict[str, Any]:
-    header, *lines = _text(content).rstrip("\r\n").split("\n")
-    if header.rstrip() != ",".join(COLUMNS):
-        raise TrajectoryError(Problem("line 1", header, f"the header {','.join(COLUMNS)}"))
-    rows = [_csv_row(line, number) for number, line in enumerate(lines, start=2)]
-    columns = dict(zip(COLUMNS, np.array(rows).reshape(-1, len(COLUMNS)).T, strict=True))
-    problems = _problems(columns, lambda name, row: f"line {row + 2}, {name}")
-    if problems:
-        raise TrajectoryError(problems)
-    return columns
-
-
-def _csv_row(line: str, number: int) -> list[float]:
-    """The numbers of one line."""
-    cells = line.split(",")
-    if len(cells) != len(COLUMNS):
-        raise TrajectoryError(Problem(f"line {number}", f"{len(cells)} values", f"{len(COLUMNS)} values"))
-    row = []
-    for name, cell in zip(COLUMNS, cells, strict=True):
-        try:
-            row.append(float(cell))
-        except ValueError:
-            raise TrajectoryError(Problem(f"line {number}, {name}", cell.strip(), "a number")) from None
-    return row
-
-
-def _encode_npz(trajectory: Trajectory) -> bytes:
-    buffer = io.BytesIO()
-    arrays = {name: getattr(trajectory, name) for name in COLUMNS}
-    np.savez(buffer, kinematic=np.array(trajectory.kinematic), **arrays)
-    return buffer.getvalue()
-
-
-def _decode_npz(content: bytes) -> dict[str, Any]:
-    try:
-        with np.load(io.BytesIO(content), allow_pickle=False) as archive:
-            values = dict(archive)
-    except Exception as error:  # a damaged archive fails in zipfile, zlib or NumPy, in a dozen ways
-        raise TrajectoryError(Problem("", str(error), "an undamaged NPZ archive")) from error
-    kinematic = values.get("kinematic")
-    if kinematic is not None and kinematic.shape == ():
-        values["kinematic"] = kinematic.item()
-    return _checked_names(values)
-
-
-def _encode_json(trajectory: Trajectory) -> bytes:
-    arrays = {name: getattr(trajectory, name).tolist() for name in COLUMNS}
-    return (json.dumps({"kinematic": trajectory.kinematic, **arrays}) + "\n").encode()
-
-
-def _decode_json(content: bytes) -> dict[str, Any]:
-    text = _text(content)
-    try:
-        values = json.loads(text)
-    except json.JSONDecodeError as error:
-        where = f"line {error.lineno}, column {error.colno}"
-        raise TrajectoryError(Problem(where, error.msg, "whole and valid JSON")) from error
-    except (ValueError, RecursionError) as error:
-        raise TrajectoryError(Problem("", str(error), "JSON of a trajectory")) from error
-    if not isinstance(values, dict):
-        raise TrajectoryError(Problem("", values, f"an object with {', '.join(COLUMNS)} and kinematic"))
-    return _checked_names(values)
-
-
-def _text(content: bytes) -> str:
-    """The text of a file, with one kind of line end."""
-    try:
-        return content.decode("utf-8-sig").replace("\r\n", "\n")
-    except UnicodeDecodeError as error:
-        raise TrajectoryError(Problem("", error.reason, "text in UTF-8")) from error
-
-
-def _checked_names(values: dict[str, Any]) -> dict[str, Any]:
-    """The values of an NPZ or JSON file, if they are all there and no others."""
-    expected = f"the entries {', '.join(COLUMNS)} and kinematic"
-    problems = [Problem(name, MISSING, expected) for name in (*COLUMNS, "kinematic") if name not in values]
-    problems += [Problem("", name, expected) for name in values if name not in (*COLUMNS, "kinematic")]
-    if not problems and not isinstance(values["kinematic"], bool):
-        problems.append(Problem("kinematic", values["kinematic"], "true or false"))
-    if problems:
-        raise TrajectoryError(problems)
-    return values
-
-
-class _Format(NamedTuple):
-    """How one file format is written and read."""
-
-    encode: Callable[[Trajectory], bytes]
-    decode: Callable[[bytes], dict[str, Any]]
-
-
-_FORMATS = {
-    ".csv": _Format(_encode_csv, _decode_csv),
-    ".json": _Format(_encode_json, _decode_json),
-    ".npz": _Format(_encode_npz, _decode_npz),
-}

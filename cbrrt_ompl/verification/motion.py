@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.trajectory.trajectory import displacement, wrapped
+from cbrrt_ompl.trajectory.displacement import displacement, wrapped
 
 LONGEST_TURN = 2.0 * math.pi
 """Largest turn from one row to the next that can be checked [rad]: a stored heading says nothing of full turns."""

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cbrrt_ompl.problem.settings import State
-from cbrrt_ompl.trajectory.trajectory import Trajectory, wrapped
+from cbrrt_ompl.trajectory.displacement import wrapped
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.verification.violation import UNITS, Violation, broken_condition
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.trajectory.trajectory import wrapped
+from cbrrt_ompl.trajectory.displacement import wrapped
 from cbrrt_ompl.verification.distances import Distances
 from cbrrt_ompl.verification.motion import Motion
 

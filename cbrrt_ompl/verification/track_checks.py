@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cbrrt_ompl.problem.settings import State
+from cbrrt_ompl.trajectory.displacement import wrapped
 from cbrrt_ompl.trajectory.track import Track
-from cbrrt_ompl.trajectory.trajectory import wrapped
 from cbrrt_ompl.verification.motion import Motion
 from cbrrt_ompl.verification.velocities import acceleration_limits, allowed_rates, wheel_speeds
 from cbrrt_ompl.verification.violation import UNITS, Violation, broken_condition, rates_text

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cbrrt_ompl.trajectory.trajectory import wrapped
+from cbrrt_ompl.trajectory.displacement import wrapped
 
 UNITS = {"x": "m", "y": "m", "theta": "rad", "v": "m/s", "omega": "rad/s"}
 """Units of the values of a state."""
