@@ -17,7 +17,7 @@ VARIABLE = "CBRRT_OMPL_COMPILED_METHODS"
 OFF = ("0", "off", "false", "no")
 """Its values that do so."""
 
-_checking = threading.Event()  # the check makes objects with compiled methods before it is known that they work
+_checking = threading.local()  # the check itself makes objects with compiled methods, before it is known that they work
 
 _log = logging.getLogger(__name__)
 
@@ -30,7 +30,7 @@ def use_compiled_methods(wanted: bool | None = None) -> bool:
     """
     if wanted is None:
         wanted = os.environ.get(VARIABLE, "").strip().lower() not in OFF
-    return wanted and (_checking.is_set() or compiled_methods_work())
+    return wanted and (getattr(_checking, "is_on", False) or compiled_methods_work())
 
 
 @cache
@@ -38,7 +38,7 @@ def compiled_methods_work() -> bool:
     """Whether this build of OMPL is what the compiled methods are made for: looked at once a process."""
     from cbrrt_ompl.ompl_plugin.self_check import check_compiled_methods  # here, since it checks what asks us
 
-    _checking.set()
+    _checking.is_on = True
     try:
         check_compiled_methods()
     except Exception as error:  # whatever it is, the Python methods work
@@ -46,5 +46,5 @@ def compiled_methods_work() -> bool:
         _log.warning("OMPL calls our Python methods, which are slower than the compiled ones: %s", reason)
         return False
     finally:
-        _checking.clear()
+        _checking.is_on = False
     return True
