@@ -91,7 +91,8 @@ def cost_in_plugin(scenario: Scenario, planner: str, size: int, seed: int) -> fl
     ended: list[tuple[float, int]] = []
 
     def should_stop(samples: int) -> bool:
-        nodes = sampler_of().children if sampler_of() else 0
+        sampler = setups[0].getPlanner().sampler
+        nodes = sampler.children if sampler else 0
         if nodes >= size:
             ended.append((time.process_time(), samples))
             return True
@@ -99,10 +100,9 @@ def cost_in_plugin(scenario: Scenario, planner: str, size: int, seed: int) -> fl
             began.append((time.process_time(), samples))
         return time.perf_counter() - started > TIME_LIMIT
 
-    equipment: list = []
-    sampler_of = lambda: equipment[0].sampler if equipment else None  # noqa: E731
+    setups: list = []
     started = time.perf_counter()
-    run(scenario, planner, seed, lambda: None, should_stop, equipment.append)
+    run(scenario, planner, seed, lambda: None, should_stop, prepare=setups.append)
     if not ended:
         return float("nan")
     return (ended[0][0] - began[0][0]) / (ended[0][1] - began[0][1])

@@ -11,12 +11,7 @@ from cbrrt_ompl.ompl_plugin.anytime_planner import AnytimePlanner, Progress
 from cbrrt_ompl.ompl_plugin.binding import ob, ou
 from cbrrt_ompl.ompl_plugin.compiled_planner import CompiledPlanner
 from cbrrt_ompl.ompl_plugin.paper_planner import PaperPlanner
-from cbrrt_ompl.ompl_plugin.setup import (
-    Equipment,
-    equip,
-    first_solution_objective,
-    make_planner,
-)
+from cbrrt_ompl.ompl_plugin.setup import equip, first_solution_objective, make_planner
 from cbrrt_ompl.ompl_plugin.space import register_projection
 from cbrrt_ompl.planners.registry import is_compiled, scenario_for
 from cbrrt_ompl.scenario.scenario import Scenario
@@ -31,7 +26,6 @@ class Entrant(ob.Planner):  # type: ignore[misc]  # OMPL has no type information
 
     Attributes:
         time_limit: time that a run may take [s]; OMPL's own condition looks at the clock ten times a second only.
-        equipment: what the planner was given at the switch to it; None before.
         planner: the planner of the present run; None before the first.
         planning_time: time of the last search alone [s].
     """
@@ -46,7 +40,6 @@ class Entrant(ob.Planner):  # type: ignore[misc]  # OMPL has no type information
         """
         super().__init__(setup.getSpaceInformation(), name)
         self.time_limit = math.inf
-        self.equipment: Equipment | None = None
         self.planner: Any = None
         self.planning_time = 0.0
         self._setup, self._scenario = setup, scenario_for(name, scenario)
@@ -54,13 +47,12 @@ class Entrant(ob.Planner):  # type: ignore[misc]  # OMPL has no type information
 
     def equip(self) -> None:
         """Give the shared space information this planner's propagator and sampler, and take away all others."""
-        self.equipment = equip(self.getSpaceInformation(), self._scenario, self.getName())
+        equip(self.getSpaceInformation(), self._scenario, self.getName())
         if self.getName() == "sst":
             self._setup.setOptimizationObjective(first_solution_objective(self.getSpaceInformation()))
 
     def prepare(self, seed: int) -> None:
-        """Make the planner of a run; outside of the measured time."""
-        assert self.equipment is not None
+        """Make the planner of a run, after :meth:`equip`; outside of the measured time."""
         ou.RNG.setSeed(seed + 1)
         self.planner = self._make(seed)
         space = self._setup.getStateSpace()

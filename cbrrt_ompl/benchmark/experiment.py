@@ -17,7 +17,7 @@ from cbrrt_ompl.motion.model import CLOSED_LOOP
 from cbrrt_ompl.ompl_plugin.binding import ot, ou
 from cbrrt_ompl.ompl_plugin.results import trajectory_from_path
 from cbrrt_ompl.ompl_plugin.run import quiet_ompl
-from cbrrt_ompl.ompl_plugin.setup import make_equipped_setup
+from cbrrt_ompl.ompl_plugin.setup import make_setup
 from cbrrt_ompl.planners.registry import law_of, planner_named
 from cbrrt_ompl.planning import plan
 from cbrrt_ompl.scenario.scenario import Scenario
@@ -64,7 +64,7 @@ class Experiment:
         check_entries(scenario, seeds)
         self._scenario, self._seeds, self._name = scenario, seeds, name
         with quiet_ompl():
-            self._setup, _ = make_equipped_setup(scenario, next(iter(seeds)))
+            self._setup = make_setup(scenario, next(iter(seeds)))
             self._setup.getSpaceInformation().clearDirectedSamplerAllocator()
             self._setup.setup()
         self.entrants = {planner: Entrant(self._setup, scenario, planner) for planner in seeds}

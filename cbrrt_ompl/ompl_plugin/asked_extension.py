@@ -33,8 +33,6 @@ class AskedExtension(NamedTuple):
     """Command (v, omega) that line 5 of Algorithm II compares."""
     control: tuple[float, float, float]
     """Control of the new edge."""
-    reaches_goal: bool
-    """Whether it ends in the goal."""
 
 
 class OmplSteps:
@@ -111,14 +109,14 @@ class OmplSteps:
         """The candidate that ends nearest to the reference, of those that are neither refused nor blocked."""
         model = self._model
         reference = reference_pose(node.x, node.y, node.theta, *sample, model["look_ahead"])
-        best = AskedExtension(REFUSED, 0, (0.0, 0.0), (0.0, 0.0, 0.0), False)
+        best = AskedExtension(REFUSED, 0, (0.0, 0.0), (0.0, 0.0, 0.0))
         nearest = math.inf
         for choice in range(CANDIDATES if model["law"] == STEERING else 1):
             v, omega, numbers = candidate(choice, (*node,), reference, model)
             raise_errors()
             if is_refused(v, omega):
                 continue
-            steps, is_free, in_goal = self._drive(source, numbers, control)
+            steps, is_free, _ = self._drive(source, numbers, control)
             if steps == 0 or not (is_free or model["keep_cut"]):
                 if best.outcome == REFUSED:
                     best = best._replace(outcome=BLOCKED)
@@ -127,7 +125,7 @@ class OmplSteps:
             distance = (reached.x - reference[0]) ** 2 + (reached.y - reference[1]) ** 2
             if distance < nearest:
                 nearest = distance
-                best = AskedExtension(EXTENDED, steps, (v, omega), numbers, in_goal)
+                best = AskedExtension(EXTENDED, steps, (v, omega), numbers)
                 self.end, self._spare = self._spare, self.end
         return best
 
@@ -144,8 +142,8 @@ class OmplSteps:
             steps, is_free, in_goal = self._drive(source, numbers, control, most)
             if is_free and in_goal:
                 self.end, self._spare = self._spare, self.end
-                return AskedExtension(EXTENDED, steps, (0.0, 0.0), numbers, True)
-        return AskedExtension(BLOCKED, 0, (0.0, 0.0), (0.0, 0.0, 0.0), False)
+                return AskedExtension(EXTENDED, steps, (0.0, 0.0), numbers)
+        return AskedExtension(BLOCKED, 0, (0.0, 0.0), (0.0, 0.0, 0.0))
 
     def _drive(
         self, source: Any, numbers: tuple[float, float, float], control: Any, most: int | None = None

@@ -150,10 +150,9 @@ class Extender:
         self._asked: OmplSteps | None = None if is_ours else OmplSteps(si, model[0], self._ompl_goal)
         has_own_goal = self._ompl_goal is not None and region is None
         self._goal_finder = OmplSteps(si, model[0], self._ompl_goal) if has_own_goal else None
-        if not is_ours:
-            if planning.brake_safe and not model["jumps"][0]:
-                expected = "False where the validity checker or the propagator is not ours"
-                raise SettingsError(Problem("planning.brake_safe", True, expected))
+        if not is_ours and planning.brake_safe and not model["jumps"][0]:
+            expected = "False where the validity checker or the propagator is not ours"
+            raise SettingsError(Problem("planning.brake_safe", True, expected))
 
     def extend(
         self,

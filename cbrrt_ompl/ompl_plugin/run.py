@@ -13,7 +13,7 @@ from cbrrt_ompl.ompl_plugin.binding import ob, ou
 from cbrrt_ompl.ompl_plugin.compiled_methods import use_compiled_methods
 from cbrrt_ompl.ompl_plugin.paper_planner import PaperPlanner
 from cbrrt_ompl.ompl_plugin.results import trajectory_from_path, tree_from_planner
-from cbrrt_ompl.ompl_plugin.setup import Equipment, make_equipped_setup
+from cbrrt_ompl.ompl_plugin.setup import make_setup
 from cbrrt_ompl.planners.first_plan import FirstPlan
 from cbrrt_ompl.scenario.scenario import Scenario
 
@@ -27,7 +27,6 @@ def run(
     seed: int | None,
     on_start: Callable[[], None],
     should_stop: Callable[[int], bool],
-    on_equipped: Callable[[Equipment], None] = lambda _: None,
     prepare: Callable[[Any], None] = lambda _: None,
 ) -> FirstPlan:
     """Set a planner up and let it solve the scenario; other threads wait, and their clocks with them.
@@ -38,15 +37,15 @@ def run(
         seed: 0 or more, or None for a fresh one.
         on_start: called when the search begins.
         should_stop: called once a round of the planner's main loop, with the rounds so far.
-        on_equipped: takes what the planner was given.
         prepare: takes the ``SimpleSetup`` before it is set up, to change it.
     """
     use_compiled_methods()  # their check compiles, and no seed may depend on it
     with _ompl, quiet_ompl():
         # OMPL complains about a second seed in a process; yet all that is random below is allocated from here on
         ou.RNG.setSeed(1 + (secrets.randbits(31) if seed is None else int(seed)))
-        setup, equipment = make_equipped_setup(scenario, planner)
-        on_equipped(equipment)
+        setup = make_setup(scenario, planner)
+        si = setup.getSpaceInformation()
+        model = si.getStatePropagator().model
         prepare(setup)
         solver = setup.getPlanner()
         if isinstance(solver, PaperPlanner):
@@ -58,7 +57,6 @@ def run(
         began = time.perf_counter()
         setup.solve(condition)
         planning_time = time.perf_counter() - began
-        si = setup.getSpaceInformation()
         trajectory = None
         if setup.haveExactSolutionPath():
             trajectory = trajectory_from_path(setup.getSolutionPath(), scenario)
@@ -67,7 +65,7 @@ def run(
         count_nodes=lambda: count_nodes(setup.getPlanner(), si),
         samples=solver.samples if isinstance(solver, PaperPlanner) else rounds.count,
         planning_time=planning_time,
-        make_tree=lambda: tree_from_planner(setup.getPlanner(), si, equipment.model),
+        make_tree=lambda: tree_from_planner(setup.getPlanner(), si, model),
     )
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import import_module
 from typing import Any
 
 from cbrrt_ompl.motion.model import CLOSED_LOOP, STEERING, check_step
-from cbrrt_ompl.motion.records import Records
 from cbrrt_ompl.ompl_plugin.anytime_planner import AnytimePlanner
 from cbrrt_ompl.ompl_plugin.binding import ob, oc
 from cbrrt_ompl.ompl_plugin.compiled_methods import use_compiled_methods
@@ -25,17 +24,6 @@ from cbrrt_ompl.scenario.scenario import Scenario, check_scenario
 
 FREE_VOLUME_SAMPLES = 8192
 """States by which Syclop estimates the free volume of its cells before it looks at the clock: 8 a cell, not 98."""
-
-
-@dataclass
-class Equipment:
-    """What one planner was given.
-
-    Attributes:
-        model: of its propagator, see :func:`cbrrt_ompl.motion.model.make_model`.
-    """
-
-    model: Records
 
 
 def make_setup(scenario: Scenario, planner: str = "cb-rrt", compiled: bool | None = None) -> Any:
@@ -58,19 +46,6 @@ def make_setup(scenario: Scenario, planner: str = "cb-rrt", compiled: bool | Non
         UnknownPlannerError: if there is no such planner.
         SettingsError: if the step is too long for the robot.
     """
-    return make_equipped_setup(scenario, planner, compiled)[0]
-
-
-def make_equipped_setup(
-    scenario: Scenario, planner: str = "cb-rrt", compiled: bool | None = None
-) -> tuple[Any, Equipment]:
-    """:func:`make_setup` together with what the planner was given.
-
-    Args:
-        scenario: world, robot, start, goal and settings.
-        planner: see :func:`make_setup`.
-        compiled: see :func:`make_setup`.
-    """
     compiled = use_compiled_methods(compiled)
     check_scenario(scenario)
     row, scenario = planner_named(planner), scenario_for(planner, scenario)
@@ -90,14 +65,14 @@ def make_equipped_setup(
     write_state(start(), scenario.start)
     setup.setStartState(start)
     setup.setGoal(make_goal(si, space, scenario.goal, compiled))
-    equipment = equip(si, scenario, planner, compiled)
+    equip(si, scenario, planner, compiled)
     setup.setPlanner(make_planner(si, scenario, planner, compiled))
     if planner == "sst":
         setup.setOptimizationObjective(first_solution_objective(si, compiled))
-    return setup, equipment
+    return setup
 
 
-def equip(si: Any, scenario: Scenario, planner: str, compiled: bool | None = None) -> Equipment:
+def equip(si: Any, scenario: Scenario, planner: str, compiled: bool | None = None) -> None:
     """Give a space information the propagator of one planner, and take away all others' parts.
 
     Args:
@@ -118,7 +93,6 @@ def equip(si: Any, scenario: Scenario, planner: str, compiled: bool | None = Non
     )
     si.setStatePropagator(propagator)
     si.clearDirectedSamplerAllocator()
-    return Equipment(propagator.model)
 
 
 def make_planner(

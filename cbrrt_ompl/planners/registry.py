@@ -1,6 +1,6 @@
 """All planners: a row each, and what follows from it.
 
-To add a planner of OMPL, add its row; a compiled kind of its own also needs its growth, see docs/contributing.md.
+To add a planner of OMPL, add its row, see docs/contributing.md.
 """
 
 from __future__ import annotations
