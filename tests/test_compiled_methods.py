@@ -230,6 +230,31 @@ def test_another_wheel_falls_back_with_one_line(
     assert setup.solve(20.0).asString() == "Exact solution"
 
 
+@UNLESS_OFF
+def test_no_thread_has_compiled_methods_before_the_check_is_over(
+    unchecked: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those that asked meanwhile were told that they work: on another wheel, that is memory corruption."""
+    has_begun, may_end = threading.Event(), threading.Event()
+
+    def check() -> None:
+        has_begun.set()
+        may_end.wait(10.0)
+        raise LayoutError("another wheel")
+
+    monkeypatch.setattr(self_check, "check_compiled_methods", check)
+    answers: list[bool] = []
+    threads = [threading.Thread(target=lambda: answers.append(use_compiled_methods())) for _ in range(2)]
+    threads[0].start()
+    assert has_begun.wait(10.0)
+    threads[1].start()
+    threads[1].join(0.2)
+    may_end.set()
+    for thread in threads:
+        thread.join()
+    assert answers == [False, False]
+
+
 def test_without_sizes_of_symbols_it_falls_back(unchecked: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """As on macOS, whose dlfcn.h has no dladdr1."""
     monkeypatch.setattr(native_layout.ctypes, "CDLL", lambda _: object())
