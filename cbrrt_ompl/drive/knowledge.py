@@ -54,12 +54,12 @@ class Knowledge:
         Returns:
             The obstacles seen for the first time.
         """
-        is_seen = distance_from_box(self._boxes.T, x, y) <= sensor_range
         if self._sight is not None and self._unseen is not None:
             view = self._sight.look(x, y, sensor_range)
             self._unseen.look(x, y, view)
             is_seen = view.is_seen[self._rows]
         else:
+            is_seen = distance_from_box(self._boxes.T, x, y) <= sensor_range
             for i in np.flatnonzero(is_seen):
                 is_seen[i] = signed_distance(self.hidden[i], np.array([x]), np.array([y]))[0] <= sensor_range
         seen = list(compress(self.hidden, is_seen))

@@ -83,8 +83,8 @@ class UnseenSpace:
             hidden: obstacles that no look has shown: wherever they are, space is unseen.
         """
         way = shapely.LineString(motion[:, :2]) if len(motion) > 1 else shapely.Point(motion[0, :2])
-        near = shapely.intersection(self.region, shapely.buffer(way, footprint.circumscribed_radius + SLACK))
-        near = _areas(shapely.set_precision(_areas(near), GRID))
+        around = shapely.buffer(way, footprint.circumscribed_radius + SLACK)
+        near = _areas(shapely.intersection(self.region, around, grid_size=GRID))
         triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(near))
         if len(triangles) == 0 and not hidden:
             return False
