@@ -82,9 +82,8 @@ class PoseGoal(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no ty
         self.setThreshold(1.0)
         self.goal = goal
         self._reals = StateReals(space, STATE_DIMENSION)
-        self._region = make_model(OPEN_LOOP, Robot(), goal, PlanningSettings())[
-            "goal"
-        ].copy()  # the rest has no meaning
+        model = make_model(OPEN_LOOP, Robot(), goal, PlanningSettings())  # all but its goal has no meaning
+        self._region = model["goal"].copy()
         if type(self).distanceGoal is _DISTANCE_GOAL and use_compiled_methods(compiled):
             make_goal_native(self, self._region)
 

@@ -75,37 +75,32 @@ def bits_of(_: Any, value: Any) -> Any:
     return types.int64(types.float64), generate
 
 
+def _call_of(result: ir.Type, count: int) -> Any:
+    """Code that calls the C++ method whose address is the first argument with the other ones, so many addresses."""
+    kind = ir.FunctionType(result, [_ADDRESS] * count)
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.call(builder.inttoptr(args[0], kind.as_pointer()), args[1:])
+
+    return generate
+
+
 @_intrinsic
 def call_is_valid(_: Any, method: Any, this: Any, state: Any) -> Any:
     """Call a ``bool (const State *) const`` at an address."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        kind = ir.FunctionType(ir.IntType(8), [_ADDRESS] * 2)
-        return builder.call(builder.inttoptr(args[0], kind.as_pointer()), args[1:])
-
-    return types.uint8(types.int64, types.int64, types.int64), generate
+    return types.uint8(types.int64, types.int64, types.int64), _call_of(ir.IntType(8), 2)
 
 
 @_intrinsic
 def call_distance(_: Any, method: Any, this: Any, state: Any, other: Any) -> Any:
     """Call a ``double (const State *, const State *) const`` at an address."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        kind = ir.FunctionType(_REAL, [_ADDRESS] * 3)
-        return builder.call(builder.inttoptr(args[0], kind.as_pointer()), args[1:])
-
-    return types.float64(*[types.int64] * 4), generate
+    return types.float64(*[types.int64] * 4), _call_of(_REAL, 3)
 
 
 @_intrinsic
 def call_sample_to(_: Any, method: Any, this: Any, control: Any, source: Any, dest: Any) -> Any:
     """Call an ``unsigned int (Control *, const State *, State *)`` at an address."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        kind = ir.FunctionType(ir.IntType(32), [_ADDRESS] * 4)
-        return builder.call(builder.inttoptr(args[0], kind.as_pointer()), args[1:])
-
-    return types.uint32(*[types.int64] * 5), generate
+    return types.uint32(*[types.int64] * 5), _call_of(ir.IntType(32), 4)
 
 
 @_intrinsic

@@ -63,17 +63,14 @@ PROPAGATOR_RECORD = np.dtype(
     ]
 )
 
+_SCENE_FIELDS = [
+    *((name, np.int64) for name in Scene._fields),  # addresses of the scene's arrays
+    *((f"{name}_count", np.int64) for name in ("cell", "list", "piece", "corner")),  # and their lengths
+]
+
 CHECKER_RECORD = np.dtype(
     [
-        ("frame", np.int64),  # addresses of the scene's arrays
-        ("cells", np.int64),
-        ("lists", np.int64),
-        ("pieces", np.int64),
-        ("corners", np.int64),
-        ("cell_count", np.int64),  # and their lengths
-        ("list_count", np.int64),
-        ("piece_count", np.int64),
-        ("corner_count", np.int64),
+        *_SCENE_FIELDS,
         ("position_bounds", np.int64),  # addresses of the vectors of the lows, each followed by that of the highs
         ("velocity_bounds", np.int64),
         ("checked", np.int64),  # states judged so far
@@ -83,15 +80,7 @@ CHECKER_RECORD = np.dtype(
 
 SAMPLER_RECORD = np.dtype(
     [
-        ("frame", np.int64),  # as above
-        ("cells", np.int64),
-        ("lists", np.int64),
-        ("pieces", np.int64),
-        ("corners", np.int64),
-        ("cell_count", np.int64),
-        ("list_count", np.int64),
-        ("piece_count", np.int64),
-        ("corner_count", np.int64),
+        *_SCENE_FIELDS,
         ("model", np.int64),
         ("block", np.int64),  # address of room for the kernel
         ("parents", np.int64),  # addresses of the arrays of the children

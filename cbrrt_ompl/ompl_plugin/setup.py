@@ -31,8 +31,7 @@ def make_setup(scenario: Scenario, planner: str = "cb-rrt", compiled: bool | Non
 
     Args:
         scenario: world, robot, start, goal and settings.
-        planner: `cb-rrt`, `s-rrt`, `cb-rrt-compiled`, `s-rrt-compiled`, `cb-rrt-robust`, or a planner of OMPL: `rrt`,
-            `kpiece1`, `est`, `sst`, `pdst`, `syclop-rrt`, `syclop-est`.
+        planner: a name from :data:`cbrrt_ompl.planners.registry.PLANNERS`.
         compiled: whether OMPL calls compiled code in the place of our Python methods, with the same results bit for
             bit; None: yes, unless the environment has ``CBRRT_OMPL_COMPILED_METHODS=0``.
 

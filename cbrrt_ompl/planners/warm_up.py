@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from functools import cache
 
-from cbrrt_ompl.collision.world import Bounds, World
+from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.kernels.beside import compiled_beside
 from cbrrt_ompl.motion.model import OPEN_LOOP, make_model
 from cbrrt_ompl.motion.records import record_array
@@ -14,6 +14,7 @@ from cbrrt_ompl.planners.nearest import GRID, make_index, nearest
 from cbrrt_ompl.planners.reachable import reachable_cells
 from cbrrt_ompl.planners.roll_out import STEPS, can_brake, free_steps
 from cbrrt_ompl.planners.search import FIRST_CAPACITY, Search
+from cbrrt_ompl.problem.obstacles import Bounds
 from cbrrt_ompl.problem.robot import Footprint, Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 
