@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Integral
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -67,13 +68,8 @@ def cells_from(
     Raises:
         MapError: if these are no such values.
     """
-    try:
-        values = np.asarray(grid)
-    except ValueError:  # rows of different lengths
-        raise MapError(Problem("grid", grid, "cells in rows and columns")) from None
+    values = _rows_and_columns(grid, "grid")
     check_thresholds(occupied_thresh, free_thresh)
-    if values.ndim != 2 or values.size == 0:
-        raise MapError(Problem("grid", Remark(f"the shape {values.shape}"), "cells in rows and columns"))
     check_cell_count(values.shape, "grid")
     if values.dtype == bool:
         return np.where(values, OCCUPIED, FREE).astype(np.int8)
@@ -106,12 +102,7 @@ def cells_from_costs(costs: ArrayLike, lethal_threshold: int | None = None) -> N
     Raises:
         MapError: if these are no such values.
     """
-    try:
-        values = np.asarray(costs)
-    except ValueError:  # rows of different lengths
-        raise MapError(Problem("costs", costs, "cells in rows and columns")) from None
-    if values.ndim != 2 or values.size == 0:
-        raise MapError(Problem("costs", Remark(f"the shape {values.shape}"), "cells in rows and columns"))
+    values = _rows_and_columns(costs, "costs")
     if values.dtype.kind not in "iu":
         expected = "whole numbers: a costmap (0 to 254, 255 unknown) or an OccupancyGrid (0 to 100, -1 unknown)"
         raise MapError(Problem("costs", Remark(f"values of type {values.dtype}"), expected))
@@ -130,6 +121,22 @@ def cells_from_costs(costs: ArrayLike, lethal_threshold: int | None = None) -> N
     cells = np.where(values >= lethal, OCCUPIED, FREE).astype(np.int8)
     cells[(values == 255) | (values == -1)] = UNKNOWN
     return cells
+
+
+def _rows_and_columns(values: ArrayLike, name: str) -> NDArray[Any]:
+    """Values as an array of two dimensions that is not empty.
+
+    Raises:
+        MapError: if they are none, under some name.
+    """
+    expected = "cells in rows and columns"
+    try:
+        array: NDArray[Any] = np.asarray(values)
+    except ValueError:  # rows of different lengths
+        raise MapError(Problem(name, values, expected)) from None
+    if array.ndim != 2 or array.size == 0:
+        raise MapError(Problem(name, Remark(f"the shape {array.shape}"), expected))
+    return array
 
 
 def blocked_cells(cells: NDArray[np.int8], unknown: str) -> NDArray[np.bool_]:
