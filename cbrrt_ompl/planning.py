@@ -59,7 +59,7 @@ Progress = Callable[[int, float], None]
 
 @dataclass(frozen=True, eq=False)
 class PlanResult(Shown):
-    """What came of a plan."""
+    """The result of a plan."""
 
     planner: str
     """The planner's name."""
@@ -159,12 +159,12 @@ def plan(
     improves = is_anytime or improve_for is not None or max_iterations is not None
     if improves:
         warm_up_improvement()
-    watch = _Watch(time_limit, progress)
     if not scenario.goal.violations(scenario.start):
         return _already_there(scenario, planner, seed)
-    watch.is_hopeless = lambda: has_no_way(scenario.world, scenario.robot.footprint, scenario.start, scenario.goal)
     if scenario.planning.approaches(scenario.goal):
         scenario = replace(scenario, goal=approachable_goal(scenario))
+    is_hopeless = partial(has_no_way, scenario.world, scenario.robot.footprint, scenario.start, scenario.goal)
+    watch = _Watch(time_limit, progress, is_hopeless)
     if not improves:
         return replace(_first_plan(scenario, planner, seed, watch), scenario=asked)
     if is_anytime and improve_for is None and max_iterations is None:
@@ -338,11 +338,9 @@ def _given(value: T) -> T:
 class _Watch:
     """Keeps the time of a search and reports its progress."""
 
-    def __init__(self, time_limit: float, progress: Progress | None) -> None:
+    def __init__(self, time_limit: float, progress: Progress | None, is_hopeless: Callable[[], bool]) -> None:
         self.ended_by = SAMPLE_LIMIT
-        self._time_limit = time_limit
-        self._progress = progress
-        self.is_hopeless: Callable[[], bool] = lambda: False
+        self._time_limit, self._progress, self._is_hopeless = time_limit, progress, is_hopeless
         self.began = self._next_report = 0.0
         self._doubts_at = math.inf
 
@@ -371,7 +369,7 @@ class _Watch:
             self._progress(samples, now - self.began)
         if now >= self._doubts_at:
             self._doubts_at = math.inf
-            if self.is_hopeless():
+            if self._is_hopeless():
                 self.ended_by = NO_WAY
                 return True
         return False

@@ -93,7 +93,7 @@ class Campaign:
 
 
 class Summary(NamedTuple):
-    """What came of a campaign."""
+    """The outcome of a campaign."""
 
     runs: int
     """Runs in the database."""

@@ -63,7 +63,7 @@ def _connect(distributed: Any, stack: ExitStack, address: str, jobs: int) -> Any
 
 
 def _outcome(future: Any) -> Outcome:
-    """What came of a job; an error where the cluster gave it up."""
+    """The outcome of a job; an error where the cluster gave it up."""
     if future.status == "finished":
         outcome: Outcome = future.result()
         return outcome

@@ -62,7 +62,7 @@ J = TypeVar("J", bound=Job)
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a job: a result, or the reason why there is none."""
+    """The outcome of a job: a result, or the reason why there is none."""
 
     result: str | None = None
     """What the job wrote."""

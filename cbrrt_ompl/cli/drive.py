@@ -104,7 +104,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _data(result: DriveResult) -> dict[str, Any]:
-    """What came of a drive, for programs, in SI units."""
+    """The result of a drive, for programs, in SI units."""
     verification = result.verification
     return {
         "planner": result.settings.planner,
@@ -126,7 +126,7 @@ def _data(result: DriveResult) -> dict[str, Any]:
 
 
 def _values(data: dict[str, Any]) -> dict[str, str]:
-    """What came of a drive, for people."""
+    """The result of a drive, for people."""
     violations = data["violations"]
     return {
         **heading(data, data["reached"]),

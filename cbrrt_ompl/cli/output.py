@@ -79,7 +79,7 @@ def print_error(error: CbrrtError | OSError) -> None:
 
 
 def verdict(text: str, is_good: bool) -> str:
-    """What came of a command, green or red."""
+    """The outcome of a command, green or red."""
     return colored(text, GREEN if is_good else RED)
 
 

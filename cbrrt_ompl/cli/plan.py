@@ -103,7 +103,7 @@ def _is_hopeless(scenario: Scenario) -> bool:
 
 
 def _data(result: PlanResult) -> dict[str, Any]:
-    """What came of a plan, for programs, in SI units."""
+    """The result of a plan, for programs, in SI units."""
     names = ("planner", "seed", "solved", "status", "nodes", "samples", "planning_time")
     trajectory = result.trajectory
     return {
@@ -116,7 +116,7 @@ def _data(result: PlanResult) -> dict[str, Any]:
 
 
 def _values(data: dict[str, Any]) -> dict[str, str]:
-    """What came of a plan, for people."""
+    """The result of a plan, for people."""
     values = {
         **heading(data, data["solved"]),
         "nodes": f"{data['nodes']:,}",

@@ -1,4 +1,4 @@
-"""What came of a drive."""
+"""The result of a drive, and of each of its cycles."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Cycle:
 
 @dataclass(frozen=True, eq=False)
 class DriveResult:
-    """What came of a drive."""
+    """The result of a drive."""
 
     status: str
     """``reached`` or ``stopped``."""

@@ -1,4 +1,4 @@
-"""What came of a drive."""
+"""Drives in the plane: the way driven, the obstacles found on it, and the sight."""
 
 from __future__ import annotations
 

@@ -89,14 +89,14 @@ class Explorer:
         self.change(**{f"{part}_x": float(event.xdata), f"{part}_y": float(event.ydata)})
 
     def __repr__(self) -> str:
-        """What came of the plan."""
+        """The scenario and the outcome of the plan."""
         return f"{self.scenario.name}: {self.message}"
 
     def _plan(self, scenario: Scenario) -> PlanResult:
         return plan(scenario, self._planner, self._seed, self._time_limit)
 
     def _told(self) -> str:
-        """What came of the plan, one line."""
+        """The outcome of the plan, one line."""
         found = self.result.trajectory
         driving = "" if found is None else f", {found.duration:.2f} s of driving"
         return f"{self.result.status}, {self.result.nodes:,} nodes, {time_text(self.result.planning_time)}{driving}"

@@ -28,7 +28,7 @@ def reference_pose(
         (x_r, y_r, theta_r), [m, m, rad].
 
     Note:
-        The paper says only that the reference comes from the sample; this reading is PAPER's.
+        The paper says only that the reference comes from the sample; this is our reading.
     """
     dx, dy = x_sample - x, y_sample - y
     distance = math.sqrt(dx * dx + dy * dy)

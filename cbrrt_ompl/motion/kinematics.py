@@ -273,7 +273,7 @@ def displacement(
         (dx, dy) [m].
 
     Note:
-        The paper names no integrator; PAPER's reading is the midpoint rule, of which this is the refinement.
+        The paper names no integrator; our reading is the midpoint rule, of which this is the refinement.
     """
     turn = 0.5 * (omega + omega_next) * duration
     speed = 0.5 * (v + v_next)

@@ -211,7 +211,7 @@ class Search:
         return tree_from_controls(*self.edges(), self.model)
 
     def first_plan(self, planning_time: float) -> FirstPlan:
-        """What came of the search so far, in some time [s]."""
+        """The result of the search so far, in some time [s]."""
         trajectory = self.trajectory() if self.has_reached_goal else None
         return FirstPlan(trajectory, lambda: self.nodes, self.samples, planning_time, self.tree)
 

@@ -62,7 +62,7 @@ class DemoRun:
     scenario: Scenario
     """What was planned for."""
     result: PlanResult
-    """What came of it."""
+    """The plan."""
     verified: bool | None
     """Whether the trajectory passed verification; None where there is none."""
 

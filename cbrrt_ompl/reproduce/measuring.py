@@ -24,7 +24,7 @@ WARM_UP = 0.01
 
 @dataclass(frozen=True)
 class Run:
-    """What came of one run."""
+    """The outcome of one run."""
 
     seed: int
     """Its seed."""
