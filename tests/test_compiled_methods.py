@@ -202,10 +202,10 @@ FAKES: dict[str, tuple[Any, str, Any, str]] = {
     "hidden wrappers": (native_layout, "symbol_address", hide("_wrapper"), "no symbol _ZTV"),
     "no look-up of objects": (native_layout, "_find_instance", lambda: lambda *_: 0, "no ompl::"),
     "a smaller vtable": (self_check, "vtable", lambda name: native_layout.vtable_words(name)[:-1], "differ"),
-    "other states": (self_check, "read_state", lambda _: (0.0,) * 5, "states are laid out in another way"),
-    "other controls": (self_check, "read_control", lambda *_: (0.0,) * 3, "controls are laid out in another way"),
+    "other states": (self_check, "state_at", lambda _: (0.0,) * 5, "states are laid out in another way"),
+    "other controls": (self_check, "control_at", lambda *_: (0.0,) * 3, "controls are laid out in another way"),
     "other bounds": (self_check, "reals_of_bounds", lambda _: [[0.0], [0.0]], "bounds are elsewhere"),
-    "other results": (self_check, "state_of", lambda _: object(), "propagate"),
+    "other results": (self_check, "read_state", lambda _: object(), "propagate"),
     "other weights": (native_space, "_reals", lambda *_: [0.0] * 3, "0 "),
 }
 

@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from cbrrt_ompl.benchmark.charts import MEASURES, boxes_figure, success_figure
+from cbrrt_ompl.benchmark.digits import three_digits
 from cbrrt_ompl.benchmark.document import Block, Bullets, Document, Heading, Picture, Table, Text
 from cbrrt_ompl.benchmark.results import Experiment, Series, read_experiments
 from cbrrt_ompl.benchmark.statistics import (
@@ -223,24 +224,14 @@ def _table_row(one: Series) -> tuple[str, ...]:
 
 def _quartiles(found: Quartiles) -> str:
     """Median [quartiles] in three digits."""
-    return f"{_number(found.median)} [{_number(found.low)}, {_number(found.high)}]"
+    return f"{three_digits(found.median)} [{three_digits(found.low)}, {three_digits(found.high)}]"
 
 
 def _ratio(ratio: Ratio) -> str:
     """A ratio with its interval."""
     if math.isnan(ratio.value):
         return "-"
-    return f"{_number(ratio.value)} [{_number(ratio.interval.low)}, {_number(ratio.interval.high)}]"
-
-
-def _number(value: float) -> str:
-    """Three significant digits, thousands with commas."""
-    if not math.isfinite(value):
-        return "-" if math.isnan(value) else "∞"
-    if value == 0.0:
-        return "0"
-    digits = max(0, 2 - math.floor(math.log10(abs(value))))
-    return f"{value:,.{digits}f}" if abs(value) < 1000.0 else f"{float(f'{value:.3g}'):,.0f}"
+    return f"{three_digits(ratio.value)} [{three_digits(ratio.interval.low)}, {three_digits(ratio.interval.high)}]"
 
 
 def _summary_row(one: Series) -> tuple[object, ...]:

@@ -129,7 +129,7 @@ def find_slot(node: tuple[float, float, float, float, float], parents: Records) 
 
 
 @kernel
-def slot_of(node: tuple[float, float, float, float, float], parents: Records, counts: Records) -> int:
+def slot_of_node(node: tuple[float, float, float, float, float], parents: Records, counts: Records) -> int:
     """The slot of a node, which is entered if it was not there."""
     i = find_slot(node, parents)
     slot = parents[i]
@@ -142,7 +142,7 @@ def slot_of(node: tuple[float, float, float, float, float], parents: Records, co
 
 @kernel
 def _slot_of_values(node: NDArray[np.float64], parents: Records, counts: Records) -> int:
-    return slot_of((node[0], node[1], node[2], node[3], node[4]), parents, counts)
+    return slot_of_node((node[0], node[1], node[2], node[3], node[4]), parents, counts)
 
 
 @kernel

@@ -116,7 +116,7 @@ def call_propagate(_: Any, method: Any, this: Any, state: Any, control: Any, dur
 
 
 @kernel(forceinline=True)
-def read_state(state: int) -> tuple[float, float, float, float, float]:
+def state_at(state: int) -> tuple[float, float, float, float, float]:
     """(x, y, theta, v, omega) of the state at an address."""
     components = peek(state + VALUES)
     position = peek(peek(components) + VALUES)
@@ -131,14 +131,14 @@ def read_state(state: int) -> tuple[float, float, float, float, float]:
 
 
 @kernel(forceinline=True)
-def read_position(state: int) -> tuple[float, float]:
+def position_at(state: int) -> tuple[float, float]:
     """(x, y) of the state at an address."""
     position = peek(peek(peek(state + VALUES)) + VALUES)
     return peek_real(position), peek_real(position + 8)
 
 
 @kernel(forceinline=True)
-def write_state(state: int, x: float, y: float, theta: float, v: float, omega: float) -> None:
+def set_state_at(state: int, x: float, y: float, theta: float, v: float, omega: float) -> None:
     """Set the state at an address."""
     components = peek(state + VALUES)
     position = peek(peek(components) + VALUES)
@@ -151,14 +151,14 @@ def write_state(state: int, x: float, y: float, theta: float, v: float, omega: f
 
 
 @kernel(forceinline=True)
-def read_control(control: int, dimension: int) -> tuple[float, float, float]:
+def control_at(control: int, dimension: int) -> tuple[float, float, float]:
     """The numbers of the control of R^2 or R^3 at an address; the third is 0 where there is none."""
     values = peek(control + VALUES)
     return peek_real(values), peek_real(values + 8), peek_real(values + 16) if dimension == 3 else 0.0
 
 
 @inner_kernel(forceinline=True)
-def write_control(control: int, values: tuple[float, float, float], dimension: int) -> None:
+def set_control_at(control: int, values: tuple[float, float, float], dimension: int) -> None:
     """Set the control of R^2 or R^3 at an address."""
     numbers = peek(control + VALUES)
     poke_real(numbers, values[0])

@@ -21,20 +21,20 @@ from cbrrt_ompl.collision.world import CONTACT_BAND
 from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.motion.model import GOAL_REGION, MODEL, advance
 from cbrrt_ompl.motion.records import Records, record_array
-from cbrrt_ompl.ompl_plugin.children import COUNTS, PARENT, add_child, slot_of
+from cbrrt_ompl.ompl_plugin.children import COUNTS, PARENT, add_child, slot_of_node
 from cbrrt_ompl.ompl_plugin.goal_distance import region_distance
 from cbrrt_ompl.ompl_plugin.native_layout import symbol_address
 from cbrrt_ompl.ompl_plugin.native_memory import (
     call_is_valid,
     call_propagate,
     call_sample_to,
+    control_at,
     peek_real,
     pointer,
-    read_control,
-    read_position,
-    read_state,
-    write_control,
-    write_state,
+    position_at,
+    set_control_at,
+    set_state_at,
+    state_at,
 )
 from cbrrt_ompl.ompl_plugin.native_space import bounds_address
 from cbrrt_ompl.ompl_plugin.space import BOUNDS_SLACK
@@ -129,10 +129,10 @@ def propagate(this: int, state: int, control: int, duration: float, result: int)
     if duration != model.dt:
         call_propagate(record.python, this, state, control, duration, result)
         return
-    x, y, theta, v, omega = read_state(state)
-    numbers = read_control(control, record.dimension)
+    x, y, theta, v, omega = state_at(state)
+    numbers = control_at(control, record.dimension)
     x, y, theta, v, omega, _, _ = advance(x, y, theta, v, omega, numbers, model, duration)
-    write_state(result, x, y, theta, v, omega)
+    set_state_at(result, x, y, theta, v, omega)
 
 
 def make_propagator_native(propagator: Any, model: Records, dimension: int) -> None:
@@ -168,7 +168,7 @@ def is_within(bounds: int, first: float, second: float) -> bool:
 def is_valid(this: int, state: int) -> bool:
     """``StateValidityChecker::isValid``: by the exact distance, through Python where FCL has to decide."""
     record = carray(pointer(record_address(this)), 1, CHECKER_RECORD)[0]
-    x, y, theta, v, omega = read_state(state)
+    x, y, theta, v, omega = state_at(state)
     found = clearance(scene_of(record), x, y, theta, 2.0 * CONTACT_BAND)[0]
     is_common = abs(found) > CONTACT_BAND and -math.pi <= theta < math.pi
     if not is_common or (record.checked + 1) % PYTHON_PERIOD == 0:
@@ -221,7 +221,7 @@ GOAL_RECORD = np.dtype([("region", np.int64)])
 def distance_goal(this: int, state: int) -> float:
     """``GoalRegion::distanceGoal`` of a :class:`cbrrt_ompl.ompl_plugin.goals.PoseGoal`."""
     record = carray(pointer(record_address(this)), 1, GOAL_RECORD)[0]
-    x, y, theta, v, omega = read_state(state)
+    x, y, theta, v, omega = state_at(state)
     return region_distance(carray(pointer(record.region), 1, GOAL_REGION)[0], x, y, theta, v, omega)
 
 
@@ -259,20 +259,20 @@ def sample_to(this: int, control: int, source: int, dest: int) -> int:
     parents = carray(pointer(record.parents), record.slots, PARENT)
     children = carray(pointer(record.children), record.capacity, CHILD)
     model, block = carray(pointer(record.model), 1, MODEL)[0], carray(pointer(record.block), 1, STEPS)[0]
-    scene, node = scene_of(record), read_state(source)
-    slot = slot_of(node, parents, counts)
+    scene, node = scene_of(record), state_at(source)
+    slot = slot_of_node(node, parents, counts)
     margin = margin_at(node[0], node[1], node[2], scene, model.room)
     first_child = parents[slot].first_child
-    found = extend(node, margin, read_position(dest), first_child, children, scene, model, block)
+    found = extend(node, margin, position_at(dest), first_child, children, scene, model, block)
     if first_child == UNTRIED:
         parents[slot].first_child = NO_CHILD
     if found.outcome != EXTENDED:
         record.refused += found.outcome == REFUSED
         return 0
     add_child(slot, found.command[0], found.command[1], parents, children, counts)
-    write_control(control, found.control, record.dimension)
+    set_control_at(control, found.control, record.dimension)
     x, y, theta, v, omega = found.state
-    write_state(dest, x, y, theta, v, omega)
+    set_state_at(dest, x, y, theta, v, omega)
     return found.steps
 
 

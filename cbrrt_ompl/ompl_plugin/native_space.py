@@ -16,7 +16,7 @@ from cbrrt_ompl.ompl_plugin.native_layout import (
     symbol_address,
     words_at,
 )
-from cbrrt_ompl.ompl_plugin.native_memory import call_distance, peek_real, pointer, read_position
+from cbrrt_ompl.ompl_plugin.native_memory import call_distance, peek_real, pointer, position_at
 from cbrrt_ompl.ompl_plugin.virtual_calls import call_compiled, call_libompl, record_address
 
 SPACE = "ompl::base::CompoundStateSpace"
@@ -141,7 +141,7 @@ def distance(this: int, first: int, second: int) -> float:
     weights = record.weights
     if not (peek_real(weights) == 1.0 and peek_real(weights + 8) == 0.0 and peek_real(weights + 16) == 0.0):
         return call_distance(record.distance, this, first, second)
-    x, y = read_position(first)
-    x_other, y_other = read_position(second)
+    x, y = position_at(first)
+    x_other, y_other = position_at(second)
     dx, dy = x - x_other, y - y_other
     return math.sqrt(dx * dx + dy * dy)

@@ -18,7 +18,7 @@ from cbrrt_ompl.ompl_plugin.binding import ob, oc
 from cbrrt_ompl.ompl_plugin.goals import PoseGoal
 from cbrrt_ompl.ompl_plugin.native_layout import BEFORE_SLOTS, LayoutError, object_address, slot_of, symbol_address
 from cbrrt_ompl.ompl_plugin.native_layout import vtable_words as vtable
-from cbrrt_ompl.ompl_plugin.native_memory import read_control, read_state
+from cbrrt_ompl.ompl_plugin.native_memory import control_at, state_at
 from cbrrt_ompl.ompl_plugin.native_methods import (
     CHECKER_WRAPPER,
     DISTANCE_GOAL,
@@ -43,8 +43,7 @@ from cbrrt_ompl.ompl_plugin.native_space import (
 )
 from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
 from cbrrt_ompl.ompl_plugin.samplers import KanayamaDirectedControlSampler
-from cbrrt_ompl.ompl_plugin.space import bounds_of, make_control_space, make_state_space, write_state
-from cbrrt_ompl.ompl_plugin.space import read_state as state_of
+from cbrrt_ompl.ompl_plugin.space import bounds_of, make_control_space, make_state_space, read_state, write_state
 from cbrrt_ompl.ompl_plugin.validity import FclStateValidityChecker
 from cbrrt_ompl.ompl_plugin.virtual_calls import virtual_method
 from cbrrt_ompl.one_libompl import has_two_copies
@@ -113,11 +112,11 @@ def check_reading() -> None:
     for _ in range(TRIALS):
         values = State(*rng.uniform(-3.0, 3.0, 5).tolist())
         write_state(state, values)
-        if read_state(object_address(state(), "ompl::base::State")) != (*values,):
+        if state_at(object_address(state(), "ompl::base::State")) != (*values,):
             raise LayoutError("states are laid out in another way")
         numbers = rng.uniform(-1.0, 1.0, 2).tolist()
         control[0], control[1] = numbers
-        if read_control(object_address(control, "ompl::control::Control"), 2) != (*numbers, 0.0):
+        if control_at(object_address(control, "ompl::control::Control"), 2) != (*numbers, 0.0):
             raise LayoutError("controls are laid out in another way")
     controls.freeControl(control)
 
@@ -148,13 +147,13 @@ def _results(is_compiled: bool) -> list[tuple[str, Any]]:
             write_state(scoped, State(*(rng.uniform(-1.0, 1.0, 5) * (4.9, 4.9, 3.0, 0.4, 0.4)).tolist()))
         control[0], control[1] = rng.uniform(-1.0, 1.0, 2).tolist()
         si.propagate(state(), control, 3, result())
-        found.append(("propagate", state_of(result)))
+        found.append(("propagate", read_state(result)))
         found.append(("isValid", (si.isValid(state()), si.isValid(result()))))
         found.append(("distance", si.distance(state(), other())))
         addresses = [object_address(scoped(), "ompl::base::State") for scoped in (state, other)]
         found.append(("distanceGoal", (goal.isSatisfied(state()), distance_goal(this_goal, addresses[0]))))
         steps = sample_to(this_sampler, object_address(control, "ompl::control::Control"), *addresses)
-        found.append(("sampleTo", (steps, control[0], control[1], state_of(other))))
+        found.append(("sampleTo", (steps, control[0], control[1], read_state(other))))
     found.append(("counters", (si.getStateValidityChecker().checked, sampler.samples, sampler.children)))
     controls.freeControl(control)
     return found

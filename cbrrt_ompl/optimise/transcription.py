@@ -136,7 +136,7 @@ class Transcription:
         limits, h = self.scenario.robot.limits, float(guess.states[0, STEP])
         parts = min(max(1, math.ceil(h / self.scenario.planning.step - 1e-9)), MOST_ROWS)
         begin = np.array(self.scenario.start, dtype=float)
-        states = roll_out(begin, guess.controls, h / parts, parts, limits, self.is_kinematic)
+        states = roll_out_controls(begin, guess.controls, h / parts, parts, limits, self.is_kinematic)
         most = self.scenario.goal.speed_tolerance
         if self.is_kinematic and most is not None and np.abs(states[-1, 3:]).max() > most:
             states = np.concatenate([states, [[*states[-1, :3], 0.0, 0.0]]])
@@ -211,7 +211,7 @@ def fill_weights(problem: Record, objective: Objective, limits: Limits) -> None:
 
 
 @kernel
-def roll_out(
+def roll_out_controls(
     begin: NDArray[np.float64],
     controls: NDArray[np.float64],
     dt: float,

@@ -5,18 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from cbrrt_ompl.benchmark.digits import three_digits
 from cbrrt_ompl.benchmark.statistics import Interval, Quartiles, Ratio
 from cbrrt_ompl.reproduce.outcomes import Sample, Share
 
 
 def number(value: float) -> str:
     """Three significant digits; a dash for NaN."""
-    if not math.isfinite(value):
-        return "–" if math.isnan(value) else "∞"
-    if value == 0.0:
-        return "0"
-    digits = max(0, 2 - math.floor(math.log10(abs(value))))
-    return f"{value:,.{digits}f}" if abs(value) < 1000.0 else f"{float(f'{value:.3g}'):,.0f}"
+    return three_digits(value, missing="–")
 
 
 def whole(value: float) -> str:

@@ -51,7 +51,7 @@ class Scenario(Shown):
     def __post_init__(self) -> None:
         """Check that the parts fit each other."""
         _check_types(self)
-        problems = find_problems(parts_of(self))
+        problems = find_problems(scenario_parts(self))
         if problems:
             raise ScenarioError(problems)
         object.__setattr__(self, "start", State(*map(float, self.start)))
@@ -77,7 +77,7 @@ class Scenario(Shown):
         return self.name, world, self.robot, self.start, self.goal, self.planning, self.map
 
 
-def parts_of(scenario: Scenario) -> dict[str, Any]:
+def scenario_parts(scenario: Scenario) -> dict[str, Any]:
     """The attributes of a scenario by name."""
     return {field.name: getattr(scenario, field.name) for field in fields(scenario)}
 
@@ -161,7 +161,8 @@ def scenario_to_dict(scenario: Scenario, folder: Path | None = None) -> dict[str
         Mappings, lists, texts and numbers that :func:`scenario_from_dict` makes an equal scenario of.
     """
     check_scenario(scenario)
-    return scenario_data(parts_of(scenario), (Path() if folder is None else as_path(folder, ScenarioError)).resolve())
+    where = Path() if folder is None else as_path(folder, ScenarioError)
+    return scenario_data(scenario_parts(scenario), where.resolve())
 
 
 def find_problems(parts: Mapping[str, Any]) -> list[Problem]:
