@@ -35,6 +35,7 @@ from scipy.sparse.csgraph import dijkstra
 from cbrrt_ompl import Goal, Scenario, State, load_dynobench, load_map, plan, verify
 from cbrrt_ompl.optimise.improving import Found
 from cbrrt_ompl.planners.registry import PLANNERS
+from cbrrt_ompl.planning import PlanResult
 
 PLANNER = next(name for name, row in PLANNERS.items() if row.is_anytime)
 
@@ -60,7 +61,7 @@ ITERATIONS = 10_000
 
 
 class Outcome(NamedTuple):
-    """What came of one plan."""
+    """The outcome of one plan."""
 
     first: float
     """CPU time of the first trajectory [s]."""
@@ -73,8 +74,8 @@ class Outcome(NamedTuple):
     is_verified: bool
 
 
-def outcome(scenario: Scenario, seed: int, budget: float, reference: float, by_length: bool) -> Outcome | None:
-    """Plan for some CPU time [s]; None where that finds nothing."""
+def plan_for(scenario: Scenario, seed: int, budget: float) -> tuple[PlanResult, list[tuple[float, Found]]]:
+    """Plan for some CPU time [s]; the result, and what was found after which CPU time [s]."""
     rows: list[tuple[float, Found]] = []
     began = time.process_time()
 
@@ -90,6 +91,12 @@ def outcome(scenario: Scenario, seed: int, budget: float, reference: float, by_l
         callback=lambda found: rows.append((elapsed(), found)),
         should_stop=lambda: elapsed() > budget,
     )
+    return result, rows
+
+
+def outcome(scenario: Scenario, seed: int, budget: float, reference: float, by_length: bool) -> Outcome | None:
+    """Plan for some CPU time [s]; None where that finds nothing."""
+    result, rows = plan_for(scenario, seed, budget)
     trajectory = result.trajectory
     if trajectory is None:
         return None

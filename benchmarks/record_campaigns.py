@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from barn import SETTINGS, score, worlds_in
-from improve import ITERATIONS, grid_scenarios
+from improve import PLANNER as OURS
+from improve import grid_scenarios, plan_for
 from lower_bound import shortest_duration
 from maps import map_scenarios
 
@@ -34,7 +35,6 @@ from cbrrt_ompl import (
     verify,
 )
 
-OURS = "cb-rrt-anytime"
 OMPLS = ("rrt", "kpiece1", "sst")
 OMPL_TIME = 10.0
 """Time of a run of OMPL's planners [s]."""
@@ -68,24 +68,29 @@ FAILED = Run(0, False, False, math.inf, math.inf)
 
 def best_after(scenario: Scenario, seed: int, budget: float, cost: Callable[[Trajectory], float]) -> Run:
     """The best trajectory of the anytime planner after some CPU time [s]."""
-    found: list[float] = []
-    began = time.process_time()
-
-    def elapsed() -> float:
-        return time.process_time() - began
-
-    result = plan(
-        scenario,
-        OURS,
-        seed,
-        time_limit=10.0,
-        max_iterations=ITERATIONS,
-        callback=lambda _: found.append(elapsed()),
-        should_stop=lambda: elapsed() > budget,
-    )
+    result, rows = plan_for(scenario, seed, budget)
     if result.trajectory is None:
         return FAILED._replace(seed=seed)
-    return Run(seed, True, verify(result.trajectory, scenario).ok, found[0], cost(result.trajectory))
+    return Run(seed, True, verify(result.trajectory, scenario).ok, rows[0][0], cost(result.trajectory))
+
+
+def ours(
+    problem: str, cases: Sequence[tuple[Scenario, float]], budget: float, cost: Callable[[Trajectory], float]
+) -> Runs:
+    """Runs of the anytime planner for some CPU time [s], their costs as multiples of references.
+
+    Args:
+        problem: one word.
+        cases: scenarios, whose numbers are their seeds, and references.
+        budget: CPU time of a run [s].
+        cost: what a trajectory costs.
+    """
+    best_after(cases[0][0], 0, 0.05, cost)  # what is made once for a world
+    runs = [
+        best_after(scenario, seed, budget, lambda found, reference=reference: cost(found) / reference)
+        for seed, (scenario, reference) in enumerate(cases)
+    ]
+    return Runs(problem, OURS, budget, runs)
 
 
 def first_of(scenario: Scenario, planner: str, seed: int, cost: Callable[[Trajectory], float]) -> Run:
@@ -101,8 +106,7 @@ def first_of(scenario: Scenario, planner: str, seed: int, cost: Callable[[Trajec
 
 def compared(problem: str, scenario: Scenario, seeds: int) -> Iterator[Runs]:
     """Ours for 200 ms, and the first trajectories of planners of OMPL's."""
-    best_after(scenario, 0, 0.05, duration)  # what is made once for a world
-    yield Runs(problem, OURS, 0.2, [best_after(scenario, seed, 0.2, duration) for seed in range(20)])
+    yield ours(problem, [(scenario, 1.0)] * 20, 0.2, duration)
     for planner in OMPLS:
         plan(scenario, planner, 0, 0.01)
         yield Runs(problem, planner, OMPL_TIME, [first_of(scenario, planner, seed, duration) for seed in range(seeds)])
@@ -113,15 +117,18 @@ def duration(trajectory: Trajectory) -> float:
     return trajectory.duration
 
 
+def length(trajectory: Trajectory) -> float:
+    """Its path length [m]."""
+    return trajectory.length
+
+
 def dynobench(data: Path, order: int) -> Iterator[Runs]:
     """Unicycles, with the tolerance for optimisers."""
     model = file_of(data, f"dynobench/unicycle{order}_v0.yaml")
     for name in ("bugtrap", "kink", "parallelpark"):
         problem = file_of(data, f"dynobench/{'' if order == 2 else 'unicycle1_'}{name}_0.yaml")
         scenario = load_dynobench(problem, model, tolerance=0.03)
-        best_after(scenario, 0, 0.05, duration)
-        runs = [best_after(scenario, seed, 0.2, duration) for seed in range(20)]
-        yield Runs(f"unicycle{order}_{name}", OURS, 0.2, runs)
+        yield ours(f"unicycle{order}_{name}", [(scenario, 1.0)] * 20, 0.2, duration)
 
 
 def dynobench_for_samplers(data: Path) -> Iterator[Runs]:
@@ -134,26 +141,17 @@ def dynobench_for_samplers(data: Path) -> Iterator[Runs]:
 
 def nav2(data: Path) -> Iterator[Runs]:
     """A Jackal that arrives with a heading and at rest in Nav2's map of 100 m x 100 m, 10 % occupied."""
-    pairs = [pair for pair in grid_scenarios(file_of(data, "ros/100by100_10.yaml"), 30) if pair[1] > 1.0]
-    best_after(pairs[0][0], 0, 0.05, duration)
-    runs = [
-        best_after(scenario, seed, 0.15, lambda found, reference=reference: found.length / reference)
-        for seed, (scenario, reference) in enumerate(pairs)
-    ]
-    yield Runs("100by100_10", OURS, 0.15, runs)
+    cases = [pair for pair in grid_scenarios(file_of(data, "ros/100by100_10.yaml"), 30) if pair[1] > 1.0]
+    yield ours("100by100_10", cases, 0.15, length)
 
 
 def ros_maps(data: Path) -> Iterator[Runs]:
     """A TurtleBot3 Waffle Pi between random free poses of maps, against a lower bound on the duration."""
     for name in ("ros/depot.yaml", "ros/tb3_sandbox.yaml", "ros/small_warehouse/map.yaml"):
-        pairs = [(s, shortest_duration(s)) for s in map_scenarios(file_of(data, name), 30)]
-        pairs = [(scenario, bound) for scenario, bound in pairs if bound > 0.0]
-        best_after(pairs[0][0], 0, 0.05, duration)
-        runs = [
-            best_after(scenario, seed, 0.1, lambda found, bound=bound: found.duration / bound)
-            for seed, (scenario, bound) in enumerate(pairs)
-        ]
-        yield Runs(name.removeprefix("ros/").removesuffix(".yaml").replace("/map", ""), OURS, 0.1, runs)
+        scenarios = map_scenarios(file_of(data, name), 30)
+        cases = [(scenario, bound) for scenario in scenarios if (bound := shortest_duration(scenario)) > 0.0]
+        problem = name.removeprefix("ros/").removesuffix(".yaml").replace("/map", "")
+        yield ours(problem, cases, 0.1, duration)
 
 
 def barn(data: Path) -> Iterator[Runs]:
@@ -208,7 +206,7 @@ def _movingai_runs(scen: Path) -> Iterator[Run]:
     world, height = load_map(scen.with_suffix("")).to_world(), int(rows[0][3])
     robot = Robot(Footprint.disc(0.4), Limits(0.0, 2.0, -2.0, 2.0, 1.0, 4.0))
     for seed, row in enumerate(rows[:: max(len(rows) // 20, 1)]):
-        (x0, y0, x1, y1), length = map(int, row[4:8]), float(row[8])
+        (x0, y0, x1, y1), shortest = map(int, row[4:8]), max(float(row[8]), 1.0)
         scenario = Scenario(
             name=scen.stem,
             world=world,
@@ -216,7 +214,7 @@ def _movingai_runs(scen: Path) -> Iterator[Run]:
             start=State(x0 + 0.5, height - y0 - 0.5),
             goal=Goal(x1 + 0.5, height - y1 - 0.5, tolerance=0.5),
         )
-        yield best_after(scenario, seed, 0.2, lambda found, length=length: found.length / max(length, 1.0))
+        yield best_after(scenario, seed, 0.2, lambda found, shortest=shortest: found.length / shortest)
 
 
 def file_of(data: Path, name: str) -> Path:
