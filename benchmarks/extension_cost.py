@@ -60,8 +60,9 @@ def worlds() -> dict[str, Scenario]:
     among = replace(empty, planning=usual, robot=rectangle)
     rng = np.random.default_rng(7)
     discs = [Disc(tuple(rng.uniform(-4.8, 4.8, 2)), float(rng.uniform(0.05, 0.25))) for _ in range(130)]
-    corners = rng.uniform(-4.9, 4.5, (150, 2))
-    corners = [c for c in corners if all(np.abs(c + 0.2 - at).max() > 0.5 for at in (-4.0, 4.0))][:100]
+    corners = [
+        c for c in rng.uniform(-4.9, 4.5, (150, 2)) if all(np.abs(c + 0.2 - at).max() > 0.5 for at in (-4.0, 4.0))
+    ][:100]
     boxes = World(bounds, [Box((x, y), (x + 0.4, y + 0.4)) for x, y in np.array(corners).tolist()])
     wall = World(bounds, [Box((x0, -0.1), (x1, 0.1)) for x0, x1 in ((-5.0, -2.1), (-1.9, 1.9), (2.1, 5.0))])
     office = World(Bounds((0.0, 0.0), (12.0, 8.4)), [Box((x0, y0), (x1, y1)) for x0, y0, x1, y1 in OFFICE])

@@ -29,6 +29,7 @@ from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 from PIL import Image
 
 from cbrrt_ompl import cli
@@ -134,7 +135,7 @@ def kinds() -> list[Kind]:
     rgba = np.dstack([pixels, pixels, pixels, np.full_like(pixels, 255)])
     images["rgba.png"] = _image(rgba, "png")
     maps = {"map.yaml": MAP.encode(), **images}
-    t = np.arange(5) * 0.1
+    t: NDArray[np.float64] = np.linspace(0.0, 0.4, 5)
     trajectory = Trajectory(t, t * 0.1 - 4.0, 0.0 * t - 4.0, 0.0 * t, 0.0 * t + 0.1, 0.0 * t, 0.0 * t + 0.1, 0.0 * t)
     with tempfile.TemporaryDirectory() as folder:
         trajectories = {}
@@ -192,7 +193,7 @@ NASTY = (
 )  # fmt: skip
 """What is put into files."""
 
-VALUES = (
+VALUES: tuple[Any, ...] = (
     None, True, False, 0, -1, 1, 0.0, -0.0, 1e-320, 1e-12, 1e-6, 0.5, 1e6, 1e9, 1e17, 1e308, -1e308, float("nan"),
     float("inf"), float("-inf"), 10**30, "", "a", "1", "1e3", "\0", "$x$", "../map.yaml", "/", ".", [], {}, [[]], [0],
     [0, 0], [1, 0], [[0, 0], [1, 1], [0, 1]], {"x": 0}, {"type": "disc", "radius": 1.0}, "disc", "free", "raw", "scale",

@@ -160,12 +160,13 @@ def grid_scenarios(path: Path, pairs: int) -> Iterator[tuple[Scenario, float]]:
     world, resolution = grid.to_world(), grid.resolution
     cells = largest_free_part(grid, JACKAL.footprint.circumscribed_radius)
     numbers = {tuple(cell): i for i, cell in enumerate(cells.tolist())}
-    rows, columns, lengths = [], [], []
+    edges = []
     for move in ((0, 1), (1, 0), (1, 1), (1, -1)):
         for (r, c), i in numbers.items():
             j = numbers.get((r + move[0], c + move[1]))
             if j is not None:
-                rows.append(i), columns.append(j), lengths.append(resolution * math.hypot(*move))
+                edges.append((i, j, resolution * math.hypot(*move)))
+    rows, columns, lengths = zip(*edges, strict=True)
     graph = csr_matrix((lengths, (rows, columns)), shape=(len(cells), len(cells)))
     rng, (x0, y0, _) = np.random.default_rng(0), grid.origin
     for _ in range(pairs):

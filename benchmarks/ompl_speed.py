@@ -47,7 +47,7 @@ def cost(scenario: Scenario, planner: str, rounds: int, seed: int) -> tuple[floa
         return True
 
     found = run(scenario, planner, seed, lambda: times.append(time.process_time()), should_stop)
-    return times[1] - times[0], found.nodes
+    return times[1] - times[0], found.count_nodes()
 
 
 def costs(

@@ -56,17 +56,17 @@ def main() -> None:
         runs = arguments.runs if cuts else arguments.failing_runs
         results = [plan(scenario, planner + arguments.suffix, seed=seed, time_limit=60.0) for seed in range(runs)]
         nodes = np.array([r.nodes if r.solved else math.inf for r in results])
-        solved = [r for r in results if r.trajectory is not None]
-        verified = sum(verify(r.trajectory, scenario).ok for r in solved)
-        line = f"{scene:<17} {planner + arguments.suffix:<16} {len(solved):>4}/{runs:<4}"
+        found = [r.trajectory for r in results if r.trajectory is not None]
+        verified = sum(verify(trajectory, scenario).ok for trajectory in found)
+        line = f"{scene:<17} {planner + arguments.suffix:<16} {len(found):>4}/{runs:<4}"
         if cuts is not None:
             quartiles = np.quantile(nodes, (0.25, 0.5, 0.75), method="inverted_cdf")
             p = p_value_of_quartiles(nodes, cuts)
             samples = np.median([r.samples for r in results])
-            seconds = np.median([r.trajectory.duration for r in solved])
+            seconds = np.median([trajectory.duration for trajectory in found])
             milliseconds = 1e3 * np.quantile([r.planning_time for r in results], (0.25, 0.5, 0.75))
             line += f" {quartiles.tolist()!s:<20} {list(cuts)!s:<17} {p:5.3f} {samples:>7.0f}"
-            line += f" {seconds:5.1f} ({duration}) {verified}/{len(solved)} {milliseconds.round(2).tolist()}"
+            line += f" {seconds:5.1f} ({duration}) {verified}/{len(found)} {milliseconds.round(2).tolist()}"
         print(line + (f"   expected {share:.1%} solved" if cuts is None else ""), flush=True)
 
 

@@ -10,6 +10,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -87,7 +88,7 @@ def ours(
     """
     best_after(cases[0][0], 0, 0.05, cost)  # what is made once for a world
     runs = [
-        best_after(scenario, seed, budget, lambda found, reference=reference: cost(found) / reference)
+        best_after(scenario, seed, budget, partial(_in_terms_of, reference, cost))
         for seed, (scenario, reference) in enumerate(cases)
     ]
     return Runs(problem, OURS, budget, runs)
@@ -115,6 +116,11 @@ def compared(problem: str, scenario: Scenario, seeds: int) -> Iterator[Runs]:
 def duration(trajectory: Trajectory) -> float:
     """What a trajectory costs, mostly [s]."""
     return trajectory.duration
+
+
+def _in_terms_of(reference: float, cost: Callable[[Trajectory], float], trajectory: Trajectory) -> float:
+    """A trajectory's cost in terms of a reference."""
+    return cost(trajectory) / reference
 
 
 def length(trajectory: Trajectory) -> float:
@@ -214,7 +220,7 @@ def _movingai_runs(scen: Path) -> Iterator[Run]:
             start=State(x0 + 0.5, height - y0 - 0.5),
             goal=Goal(x1 + 0.5, height - y1 - 0.5, tolerance=0.5),
         )
-        yield best_after(scenario, seed, 0.2, lambda found, shortest=shortest: found.length / shortest)
+        yield best_after(scenario, seed, 0.2, partial(_in_terms_of, shortest, length))
 
 
 def file_of(data: Path, name: str) -> Path:
