@@ -20,6 +20,9 @@ SHARE_OF_TWO_CORES = 0.6
 SILENCE = 30.0
 """Time after which a campaign that nobody watches tells how far it is, once [s]."""
 
+LEAST_SHARE = 0.02
+"""Share of a campaign to be done by then: it begins with the runs that take longest."""
+
 LINE = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}<{remaining}, {rate_fmt}]"
 """A progress line: how many of how many, the time since the beginning and the time left."""
 
@@ -122,7 +125,7 @@ def _one_line(total: int) -> Callable[[int], None]:
         if not began:
             began.append((now, done))
         start, before = began[0]
-        if told or done == before or done >= total or now - start < SILENCE:
+        if told or done >= total or now - start < SILENCE or done - before <= LEAST_SHARE * (total - before):
             return
         told.append(True)
         minutes = (total - done) * (now - start) / (done - before) / 60.0
