@@ -195,6 +195,15 @@ def test_a_missing_image_is_told_with_where_it_was_looked_for_and_what_lies_ther
     )
 
 
+def test_the_name_of_an_image_that_no_file_can_have_is_not_repeated(tmp_path: Path) -> None:
+    with pytest.raises(MapError) as caught:
+        load_map(write_yaml(tmp_path, image=5000 * "a"))
+    expected = (
+        f"expected a file that exists, looked for as a file in {tmp_path}, where names have at most 255 characters"
+    )
+    assert one_line(caught).endswith(expected)
+
+
 @pytest.mark.parametrize("yaw", ["nan", "-nan", ".nan", "NaN", "-nan(ind)"])
 def test_a_yaw_that_is_no_number_is_refused_with_the_remedy(tmp_path: Path, yaw: str) -> None:
     with pytest.raises(MapError, match=r"origin: got \[1.0, -2.0, .*write 0.0 there"):

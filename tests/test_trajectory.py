@@ -168,6 +168,11 @@ def test_length_counts_both_ways_where_the_velocity_changes_its_sign() -> None:
     assert profile([0.0, 1.0], [1.0, -3.0], [0.0, 0.0]).length == pytest.approx(1.25)
 
 
+@pytest.mark.parametrize("v", [(-1e308, 0.1), (1e308, 1e308), (-1e308, 1e308)])
+def test_the_length_of_a_motion_at_the_largest_velocities_is_no_warning(v: tuple[float, float]) -> None:
+    assert 4e306 < profile([0.0, 0.1], list(v), [0.0, 0.0]).length < 1.1e307
+
+
 def test_length_of_a_kinematic_trajectory_follows_the_commands() -> None:
     assert profile([0.0, 2.0, 3.0], [0.5, -1.0, 7.0], [0.0] * 3, kinematic=True).length == pytest.approx(2.0)
 

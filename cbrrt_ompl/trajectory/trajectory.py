@@ -135,9 +135,10 @@ class Trajectory(Shown):
     def length(self) -> float:
         """Way driven, backwards and forwards alike: the integral of the speed [m]."""
         v0, v1 = self.step_velocities[:2]
-        area = 0.5 * np.abs(v0 + v1)
-        crosses = v0 * v1 < 0.0
-        area[crosses] = 0.5 * (v0[crosses] ** 2 + v1[crosses] ** 2) / np.abs(v1 - v0)[crosses]
+        area = np.abs(0.5 * v0 + 0.5 * v1)  # no sum, square or product of velocities, which may overflow
+        crosses = np.sign(v0) * np.sign(v1) < 0.0
+        before, after = 0.5 * np.abs(v0[crosses]), 0.5 * np.abs(v1[crosses])
+        area[crosses] = before * (before / (before + after)) + after * (after / (before + after))
         return float(np.sum(area * np.diff(self.t)))
 
     @property

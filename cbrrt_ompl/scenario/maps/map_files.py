@@ -30,6 +30,10 @@ class MapFile(NamedTuple):
     """What was not taken as it was written, a line each."""
 
 
+LONGEST_NAME = 255
+"""Characters that the name of a file may have; a message does not repeat a longer one."""
+
+
 def find_beside(name: str, folder: Path) -> tuple[Path | None, str]:
     """The file that another one names, also if that came from another machine.
 
@@ -45,6 +49,8 @@ def find_beside(name: str, folder: Path) -> tuple[Path | None, str]:
     if _is_file(written):
         return written, ""
     last = re.split(r"[\\/]", name.rstrip())[-1]  # of either kind of machine
+    if len(last) > LONGEST_NAME:
+        return None, f"a file in {folder}, where names have at most {LONGEST_NAME} characters"
     beside = folder / last
     if last and beside != written and _is_file(beside):
         return beside, f"there is no {name}, {beside} is taken"
