@@ -155,11 +155,11 @@ class Drive:
             self._committed = _part(self._committed, at_goal, None, self._dt)
             self.status = REACHED
         else:
-            is_ready = not is_over and self._continue_plan(bool(seen))
+            is_ready, start = not is_over and self._continue_plan(bool(seen)), State(*piece.states[-1].tolist())
             if is_ready and self._is_cut_short:
-                replan = self._improve_on(State(*piece.states[-1].tolist()), looked_at, began)
+                replan = self._improve_on(start, looked_at, began)
             elif not is_ready and not is_over:
-                replan = self._replan(State(*piece.states[-1].tolist()), looked_at, portions, began)
+                replan = self._replan(start, looked_at, portions, began)
                 is_ready = replan.trajectory is not None
             if not is_ready:
                 self._plan = None
@@ -198,13 +198,13 @@ class Drive:
         result = plan(scenario, settings.planner, seed, self._time_left(limit, began))
         status, found, taken = result.status, result.trajectory, None
         if found is not None and self._is_late(limit, began):
-            status, found = LATE, None
-        if found is not None:
+            status = LATE
+        elif found is not None:
             taken = found if self._commit(found) else None
             if settings.max_iterations > 0:
                 taken = self._improve(found, scenario, limit, began) or taken
             status = UNSAFE if taken is None else status
-        shown = None if taken is None else replace(taken, t=taken.t + looked_at + limit)
+        shown = None if taken is None else _begun_at(looked_at + limit, taken)
         return record(status, result.samples, result.planning_time, shown)
 
     def _improve_on(self, start: State, looked_at: float, began: float) -> Replan | None:
@@ -216,9 +216,8 @@ class Drive:
         taken = self._improve(rest, scenario, limit, began)
         if taken is None:
             return None
-        return Replan(
-            looked_at, start, looked_at + limit, IMPROVED, 0, 0.0, replace(taken, t=taken.t + looked_at + limit)
-        )
+        ready = looked_at + limit
+        return Replan(looked_at, start, ready, IMPROVED, 0, 0.0, _begun_at(ready, taken))
 
     def _improve(self, found: Trajectory, scenario: Scenario, limit: float, began: float) -> Trajectory | None:
         """Commit to a plan made shorter, with what is left of the plan before as a guess; None where that fails."""
@@ -328,6 +327,11 @@ def _part(trajectory: Trajectory, first: int, last: int | None, dt: float) -> Tr
         commands = np.concatenate([commands, np.zeros((missing, 2))])
     rows = slice(first, None if last is None else last + 1)
     return _from_rows(states[rows], commands[rows], dt, trajectory.kinematic)
+
+
+def _begun_at(start: float, trajectory: Trajectory) -> Trajectory:
+    """A trajectory in the drive's time, which begins at some time [s]."""
+    return replace(trajectory, t=trajectory.t + start)
 
 
 def _joined(pieces: Sequence[Trajectory], dt: float) -> Trajectory:

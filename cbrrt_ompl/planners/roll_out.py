@@ -190,16 +190,18 @@ def free_steps(
     dt, room, frame = model.dt, model.room, scene.frame[0]
     i = 0
     while i < count:
-        ahead = min(i + STRIDE, count)
-        way = (ahead - i) * way_of_step(state_at(steps, i), state_at(steps, ahead), lever_arm(frame, any_heading), dt)
-        if is_monotonic and margin >= way:
-            margin -= way
-            i = ahead
-            continue
+        arm = lever_arm(frame, any_heading)
+        if is_monotonic:
+            ahead = min(i + STRIDE, count)
+            way = (ahead - i) * way_of_step(state_at(steps, i), state_at(steps, ahead), arm, dt)
+            if margin >= way:
+                margin -= way
+                i = ahead
+                continue
         start, end = state_at(steps, i), state_at(steps, i + 1)
         if model.jumps:
             start = (start[0], start[1], start[2], end[3], end[4])
-        way = way_of_step(start, end, lever_arm(frame, any_heading), dt)
+        way = way_of_step(start, end, arm, dt)
         if margin >= way:
             margin -= way
         else:
