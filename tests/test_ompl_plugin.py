@@ -315,9 +315,11 @@ def test_heading_and_speed_at_the_goal_are_obeyed(planner: str) -> None:
 # directed samplers
 
 
-def allocated(scenario: Scenario, planner: str) -> tuple[Any, ExtensionSampler]:
-    """A set-up, to be kept, and the directed sampler of its planner."""
+def allocated(scenario: Scenario, planner: str, checker: Any = None) -> tuple[Any, ExtensionSampler]:
+    """A set-up, to be kept, and the directed sampler of its planner; by a validity checker if one is given."""
     setup = make_setup(scenario, planner)
+    if checker is not None:
+        setup.setStateValidityChecker(ob.StateValidityCheckerFn(checker))
     solve(setup, 0)
     sampler = setup.getPlanner().sampler
     assert isinstance(sampler, ExtensionSampler)
@@ -381,6 +383,17 @@ def test_an_extension_ends_at_the_first_state_in_the_goal() -> None:
     setup, sampler = allocated(with_tolerance(0.1), "cb-rrt")
     steps = extend(setup, sampler, (7.0, 7.0, math.pi / 4, 1.0, 0.0), 9.0, 9.0)
     assert steps == math.ceil((math.sqrt(2.0) - EASY.goal.tolerance) / EASY.planning.step)
+
+
+@pytest.mark.parametrize(("sample", "steps"), [((2.59, 2.0), 12), ((4.0, 2.0), 40), ((1.0, 2.0), 40)])
+@pytest.mark.parametrize("checker", [None, lambda _: True], ids=["compiled", "asked"])
+def test_a_closed_loop_ends_where_it_passes_its_reference(
+    checker: Any, sample: tuple[float, float], steps: int
+) -> None:
+    """It went on at full speed, and in a small room into the next wall."""
+    scenario = replace(EASY, planning=PlanningSettings(closed_loop=True))
+    setup, sampler = allocated(scenario, "cb-rrt", checker)
+    assert extend(setup, sampler, (2.0, 2.0, 0.0, 1.0, 0.0), *sample) == steps
 
 
 @pytest.mark.parametrize(("cut", "steps"), [("discard", 0), ("keep", 35)])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from cbrrt_ompl import (
+    ROBOTS,
     Bounds,
     Box,
     Gains,
@@ -25,7 +26,7 @@ from cbrrt_ompl import (
     verify,
 )
 from cbrrt_ompl.ompl_plugin.availability import has_ompl
-from cbrrt_ompl.planners.growth import tolerated_failures
+from cbrrt_ompl.planners.growth import shortened, tolerated_failures
 from cbrrt_ompl.planners.registry import law_of
 from cbrrt_ompl.planners.search import Search, search_in
 from cbrrt_ompl.problem.settings import NEAREST_NEIGHBOUR
@@ -65,6 +66,37 @@ def test_failures_set_the_chance_to_be_passed_over(failures: int) -> None:
 
 def test_a_draw_of_zero_passes_nothing_over() -> None:
     assert tolerated_failures(0.0) == np.inf
+
+
+@pytest.mark.parametrize(("failures", "distance"), [(0, 4.0), (1, 1.0), (3, 0.5), (30, 0.25)])
+def test_failures_shorten_the_way_of_the_next_extension(failures: int, distance: float) -> None:
+    assert shortened((5.0, 1.0), 1.0, 1.0, failures, 2.0) == pytest.approx((1.0 + distance, 1.0))
+
+
+def test_a_sample_within_look_ahead_is_drawn_nearer_too() -> None:
+    assert shortened((2.0, 1.0), 1.0, 1.0, 1, 2.0) == pytest.approx((1.5, 1.0))
+    assert shortened((1.0, 1.0), 1.0, 1.0, 5, 2.0) == (1.0, 1.0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_rooms_that_are_crossed_in_a_part_of_the_horizon_are_no_trap(seed: int) -> None:
+    walls = []
+    for c in (1, 2, 3):
+        for low in range(4):
+            for first, last in ((low, low + 0.2), (low + 0.8, low + 1.0)):
+                walls.append(Box((c - 0.02, first), (c + 0.02, last)))
+                walls.append(Box((first, c - 0.02), (last, c + 0.02)))
+    scenario = Scenario(
+        name="rooms of 1 m",
+        world=World(Bounds((0.0, 0.0), (4.0, 4.0)), walls),
+        robot=ROBOTS["jackal"],
+        start=State(0.5, 0.5, 0.3),
+        goal=Goal(3.5, 3.5, tolerance=0.2),
+        planning=PlanningSettings(max_samples=60_000),
+    )
+    result = plan(scenario, ROBUST, seed, time_limit=60.0)
+    assert result.status == "solved" and result.trajectory is not None
+    assert verify(result.trajectory, scenario).ok
 
 
 def test_every_failed_extension_is_counted_at_a_place(blind_alley: Scenario) -> None:

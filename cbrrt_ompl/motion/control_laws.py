@@ -59,6 +59,12 @@ def error_posture(
 
 
 @kernel
+def is_past(x: float, y: float, reference: tuple[float, float, float]) -> bool:
+    """Whether a position [m] lies beside the reference (x_r, y_r, theta_r) or beyond it, as seen along its heading."""
+    return math.cos(reference[2]) * (x - reference[0]) + math.sin(reference[2]) * (y - reference[1]) >= 0.0
+
+
+@kernel
 def kanayama_command(
     error: tuple[float, float, float], v_reference: float, omega_reference: float, gains: Gains
 ) -> tuple[float, float]:

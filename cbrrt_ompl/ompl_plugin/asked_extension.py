@@ -11,10 +11,10 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from cbrrt_ompl.motion.control_laws import reference_pose
+from cbrrt_ompl.motion.control_laws import is_past, reference_pose
 from cbrrt_ompl.motion.laws import raise_errors
 from cbrrt_ompl.motion.manoeuvres import FORWARD, REVERSE, most_steps
-from cbrrt_ompl.motion.model import CANDIDATES, STEERING, candidate, manoeuvre_has_ended
+from cbrrt_ompl.motion.model import CANDIDATES, CLOSED_LOOP, STEERING, candidate, manoeuvre_has_ended
 from cbrrt_ompl.motion.records import Record
 from cbrrt_ompl.ompl_plugin.binding import ob
 from cbrrt_ompl.ompl_plugin.space import read_state
@@ -148,7 +148,7 @@ class OmplSteps:
     def _drive(
         self, source: Any, numbers: tuple[float, float, float], control: Any, most: int | None = None
     ) -> tuple[int, bool, bool]:
-        """Propagate under one control until the longest duration, an invalid state or the goal.
+        """Propagate under one control until the longest duration, an invalid state, the goal or the loop's reference.
 
         Args:
             source: the state to start from.
@@ -175,8 +175,11 @@ class OmplSteps:
             if most is not None:
                 if manoeuvre_has_ended(numbers[2], (*read_state(state),), self._model["goal"]):
                     return step, True, self._is_in_goal(state)
-            elif step >= shortest and self._is_in_goal(state):
-                return step, True, True
+            elif step >= shortest:
+                if self._is_in_goal(state):
+                    return step, True, True
+                if self._model["law"] == CLOSED_LOOP and is_past(*read_state(state)[:2], numbers):
+                    return step, True, False
         return longest, most is None, False
 
     def _is_in_goal(self, state: Any) -> bool:

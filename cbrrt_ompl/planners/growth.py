@@ -1,7 +1,8 @@
 """The compiled loop: Algorithms I and II of the paper over arrays of records.
 
-The robust kind departs from the paper in one line: what is extended is the nearest place that is not passed over, and
-the more extensions from a place have failed, the likelier it is passed over (docs/robust.md).
+The robust kind departs from the paper in two lines: what is extended is the nearest place that is not passed over; and
+the more extensions from a place have failed, the likelier it is passed over, and the shorter is the next one's way
+(docs/robust.md).
 """
 
 from __future__ import annotations
@@ -26,6 +27,9 @@ GROW_REACHED, GROW_WANTS_ROOM, GROW_WANTS_DRAWS, GROW_PAUSED = 0, 1, 2, 3
 DRAWS, ROBUST_DRAWS = 4, 5
 """Random numbers of a sample: goal bias, x, y, the choice among nodes at one position; and how many failures of a place
 are tolerated."""
+
+LEAST_SHARE = 0.125
+"""Share of the way to its reference that an extension keeps, however many from its place have failed."""
 
 NODE = np.dtype(
     [
@@ -122,6 +126,25 @@ def tolerated_failures(draw: float) -> float:
 
 
 @kernel
+def shortened(sample: tuple[float, float], x: float, y: float, failures: int, look_ahead: float) -> tuple[float, float]:
+    """A sample drawn nearer to a place, the more extensions from there have failed.
+
+    Args:
+        sample: (x, y) [m].
+        x: of the place [m].
+        y: of the place [m].
+        failures: extensions from there that have failed.
+        look_ahead: largest distance of a reference [m].
+    """
+    if failures == 0:
+        return sample
+    dx, dy = sample[0] - x, sample[1] - y
+    share = max(1.0 / (1.0 + failures), LEAST_SHARE)
+    share *= look_ahead / max(math.sqrt(dx * dx + dy * dy), look_ahead)
+    return x + share * dx, y + share * dy
+
+
+@kernel
 def grow(
     tree: Records,
     index: Index,
@@ -165,6 +188,8 @@ def grow(
         if node.margin < 0.0:
             node.margin, node.any_heading = margin_at(node.x, node.y, node.theta, scene, model.room)
         state = (node.x, node.y, node.theta, node.v, node.omega)
+        if search.is_robust:
+            sample = shortened(sample, node.x, node.y, index.places[place].failures, model.look_ahead)
         extension = extend(state, (node.margin, node.any_heading), sample, node.first_child, tree, scene, model, steps)
         if node.first_child == UNTRIED:
             node.first_child = NO_CHILD

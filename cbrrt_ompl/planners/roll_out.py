@@ -11,6 +11,7 @@ from cbrrt_ompl.collision.clearance import ENOUGH, clearance
 from cbrrt_ompl.collision.motion_check import check_step_motion, lever_arm, way_of_step
 from cbrrt_ompl.collision.scene import Scene
 from cbrrt_ompl.kernels import inner_kernel, kernel
+from cbrrt_ompl.motion.control_laws import is_past
 from cbrrt_ompl.motion.kinematics import (
     decelerations,
     displacement,
@@ -138,7 +139,8 @@ def integrate_stepwise(
         model: see :func:`integrate_block`.
 
     Returns:
-        How many steps there are, fewer where a manoeuvre comes to its end; and whether it does.
+        How many steps there are, fewer where a manoeuvre comes to its end or a closed loop passes its reference; and
+        whether it does.
     """
     state = (steps.x[0], steps.y[0], steps.theta[0], steps.v[0], steps.omega[0])
     is_manoeuvring = is_manoeuvre(control)
@@ -147,7 +149,7 @@ def integrate_stepwise(
         x, y, theta, v, omega, _, _ = advance(x, y, theta, v, omega, control, model, model.dt)
         steps.x[i], steps.y[i], steps.theta[i], steps.v[i], steps.omega[i] = x, y, theta, v, omega
         state = (x, y, theta, v, omega)
-        if is_manoeuvring and manoeuvre_has_ended(control[2], state, model.goal):
+        if manoeuvre_has_ended(control[2], state, model.goal) if is_manoeuvring else is_past(x, y, control):
             return i, True
     return count, False
 
@@ -263,7 +265,7 @@ def roll_out(
             integrate_block(steps, control[0], control[1], count, model)
         if not is_manoeuvring:
             goal_at = first_in_goal(steps, count, model.goal)
-            count, is_over = min(count, goal_at), goal_at <= count
+            count, is_over = min(count, goal_at), is_over or goal_at <= count
         free, margin, any_heading = free_steps(steps, count, not is_stepwise, margin, any_heading, scene, model)
         driven += free
         if free < count:

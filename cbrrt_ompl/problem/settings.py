@@ -149,7 +149,8 @@ class PlanningSettings:
     look_ahead: float | None = None
     """Largest distance of the reference from its node [m]; None is ``v_max * horizon``."""
     closed_loop: bool | None = None
-    """Evaluate the control law at every step instead of once an extension; None is the planner's default."""
+    """Evaluate the control law at every step instead of once an extension, which then ends where the robot passes its
+    reference; None is the planner's default."""
     law: str = "kanayama"
     """Control law of CB-RRT by name: ``kanayama``, ``posq``, or one of :func:`cbrrt_ompl.register_law`."""
     final_approach: bool = True
