@@ -153,6 +153,12 @@ def test_a_file_without_mode_or_thresholds_is_trinary(tmp_path: Path) -> None:
     np.testing.assert_array_equal(load_map(path).cells, CELLS)
 
 
+def test_a_low_threshold_of_occupied_cells_is_that_of_free_ones_where_none_is_given(tmp_path: Path) -> None:
+    """A map of others with `occupied_thresh: 0.05` alone was refused for a 0.196 that it does not have."""
+    path = write_levels(tmp_path, "L", [0, 240, 250, 255], occupied_thresh="0.05", free_thresh=None)
+    assert load_map(path).cells.tolist() == [[X, X, F, F]]
+
+
 def test_comments_after_values_and_keys_of_no_interest_are_skipped(tmp_path: Path) -> None:
     path = write_map(tmp_path)
     lines = ["image: map.pgm   # from the old robot", "resolution: 5e-1 # [m]", "origin: [1, -2, 0.0] # x, y, yaw"]

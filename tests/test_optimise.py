@@ -32,6 +32,12 @@ FORWARD_ROBOT = replace(BOX_ROBOT, limits=BOX_ROBOT.limits._replace(v_min=0.0))
 
 WHEELED_ROBOT = ROBOTS["turtlebot3_burger"]
 
+ELL = Footprint.polygon([(0.4, 0.3), (0.2, 0.3), (0.2, -0.1), (-0.3, -0.1), (-0.3, -0.3), (0.4, -0.3)])
+
+TEE = Footprint.polygon(
+    [(0.5, 0.1), (0.0, 0.1), (0.0, 0.35), (-0.3, 0.35), (-0.3, -0.35), (0.0, -0.35), (0.0, -0.1), (0.5, -0.1)]
+)
+
 START, GOAL = State(1.0, 1.0, 0.5), Goal(5.0, 3.0, tolerance=0.1)
 ARRIVAL = Goal(5.0, 3.0, tolerance=0.1, theta=1.5, heading_tolerance=0.1, speed_tolerance=0.02)
 
@@ -191,6 +197,20 @@ def test_walls_of_a_millimetre_are_not_crossed() -> None:
     thin = World(Bounds((0.0, 0.0), (4.0, 4.0)), [wall, Box((1.0, 1.0), (1.001, 3.0))])
     scenario = scenario_of(world=thin, start=State(0.5, 2.0), goal=Goal(3.5, 1.0, tolerance=0.1))
     better = improve(planned(scenario), scenario, max_iterations=400)
+    assert verify(better, scenario).ok
+
+
+@pytest.mark.parametrize(("footprint", "width"), [(ELL, 0.8), (TEE, 0.9)], ids=["ell", "tee"])
+def test_a_fast_robot_with_corners_is_improved_through_doors_in_thin_walls(footprint: Footprint, width: float) -> None:
+    """Between two states of the solver corners passed through the walls; margins that forbade it closed the doors."""
+    doors = [(2.0, 0.3), (4.0, 2.8)]  # where the wall is, and where its door begins [m]
+    walls = [Box((x - 0.05, 0.0), (x + 0.05, low)) for x, low in doors]
+    walls += [Box((x - 0.05, low + width), (x + 0.05, 4.0)) for x, low in doors]
+    robot = Robot(footprint, Limits(-3.0, 3.0, -3.0, 3.0, 2.0, 4.0))
+    world = World(Bounds((0.0, 0.0), (6.0, 4.0)), walls)
+    scenario = scenario_of(world=world, robot=robot, start=State(1.0, 2.0), goal=Goal(5.0, 2.0, tolerance=0.2))
+    better = improve(planned(scenario), scenario, max_iterations=2000)
+    assert better.duration < 4.0
     assert verify(better, scenario).ok
 
 

@@ -15,7 +15,7 @@ from cbrrt_ompl.optimise.clearance import disc_distances
 from cbrrt_ompl.optimise.cover import cover
 from cbrrt_ompl.optimise.dynamics import add_derivatives, interval_end
 from cbrrt_ompl.optimise.field import Field, distance_and_gradient, field_of, make_field
-from cbrrt_ompl.optimise.guess import guess_from_trajectory, refined
+from cbrrt_ompl.optimise.guess import Guess, guess_from_trajectory, refined, split
 from cbrrt_ompl.optimise.guesses import AHEAD, geodesic, guess_along
 from cbrrt_ompl.optimise.objective import Objective
 from cbrrt_ompl.optimise.program import COLUMNS, MOST_DISCS, STATES
@@ -108,12 +108,12 @@ def test_distances_of_discs_are_those_of_the_posed_footprint() -> None:
 
 @njit
 def end_of(is_kinematic, state, control):  # type: ignore[no-untyped-def]
-    return interval_end(is_kinematic, state, control)
+    return interval_end(is_kinematic, state, control, 0.5)
 
 
 @njit
 def derivatives_of(is_kinematic, state, control, costate, jacobian, hessian, end):  # type: ignore[no-untyped-def]
-    add_derivatives(is_kinematic, state, control, costate, jacobian, hessian, end)
+    add_derivatives(is_kinematic, state, control, 0.5, costate, jacobian, hessian, end)
 
 
 def derivatives(
@@ -183,20 +183,46 @@ def test_there_is_no_geodesic_through_a_closed_wall() -> None:
     assert geodesic(Scenario(name="closed", world=world, start=State(1.0, 1.0), goal=Goal(5.0, 1.0))) is None
 
 
-@pytest.mark.parametrize("is_kinematic", [False, True], ids=["dynamic", "kinematic"])
-def test_a_refined_guess_is_the_same_motion(is_kinematic: bool) -> None:
+def solution_in_the_open(*, is_kinematic: bool) -> tuple[Transcription, Guess]:
     scenario = Scenario(name="open", world=OPEN, start=State(1.0, 1.0, 1.0), goal=Goal(8.0, 3.0, tolerance=0.1))
     path = geodesic(scenario)
     assert path is not None
     transcription = Transcription(scenario, Objective(), is_kinematic=is_kinematic)
     guess = guess_along(path, scenario, AHEAD, "ahead")
     n = len(guess.states)
-    solution = transcription.solve(guess, np.zeros(n), np.ones(n), 0.1, 1e-4, lambda done: 200 - done).guess
+    return transcription, transcription.solve(guess, np.zeros(n), np.ones(n), 0.1, 1e-4, lambda done: 200 - done).guess
+
+
+@pytest.mark.parametrize("is_kinematic", [False, True], ids=["dynamic", "kinematic"])
+def test_intervals_of_different_lengths_are_solved_and_rolled_out_to_even_rows(is_kinematic: bool) -> None:
+    transcription, solution = solution_in_the_open(is_kinematic=is_kinematic)
+    before = transcription.trajectory(solution)
+    for first in (0, 5):
+        chosen = np.zeros(len(solution.controls), dtype=np.bool_)
+        chosen[first : first + 7] = True
+        solution = split(solution, chosen, is_kinematic=is_kinematic)
+    assert sorted(set(solution.multiples.tolist())) == [1, 2, 4]
+    same = transcription.trajectory(solution)
+    assert same.duration == pytest.approx(before.duration)
+    assert same.states[-1] == pytest.approx(before.states[-1], abs=1e-5)
+    n = len(solution.states)
+    again = transcription.solve(solution, np.zeros(n), np.ones(n), 1e-3, 1e-5, lambda done: 100 - done)
+    assert again.infeasibility < 1e-5
+    np.testing.assert_array_equal(again.guess.multiples, solution.multiples)
+    trajectory = transcription.trajectory(again.guess)
+    assert np.diff(trajectory.t) == pytest.approx(trajectory.t[1])
+    ends = trajectory.states[np.append(0, np.cumsum(transcription.rows(again.guess))), :3]
+    assert ends == pytest.approx(again.guess.states[:, :3], abs=2e-3)
+
+
+@pytest.mark.parametrize("is_kinematic", [False, True], ids=["dynamic", "kinematic"])
+def test_a_refined_guess_is_the_same_motion(is_kinematic: bool) -> None:
+    transcription, solution = solution_in_the_open(is_kinematic=is_kinematic)
     finer = refined(solution, is_kinematic=is_kinematic)
     coarse, fine = transcription.trajectory(solution), transcription.trajectory(finer)
     driven = fine.at(np.arange(len(finer.states)) * finer.states[0, -1] * (1.0 - 1e-9))
     assert np.abs(driven[1:, 2:] - finer.states[1:, 2:5]).max() < 2e-3  # heading and velocities
     assert fine.duration == pytest.approx(coarse.duration)
     assert fine.states[-1] == pytest.approx(coarse.states[-1], abs=1e-5)
-    again = guess_from_trajectory(coarse, scenario.robot.limits, "again")
+    again = guess_from_trajectory(coarse, transcription.scenario.robot.limits, "again")
     assert again.states[-1, :2] == pytest.approx(coarse.states[-1, :2])

@@ -70,9 +70,9 @@ def gauss_point(
 
 @inner_kernel
 def interval_end(
-    is_kinematic: bool, state: NDArray[np.float64], control: NDArray[np.float64]
+    is_kinematic: bool, state: NDArray[np.float64], control: NDArray[np.float64], step_ratio: float
 ) -> tuple[float, float, float, float, float, float]:
-    """The state f(w) at the end of an interval."""
+    """The state f(w) at the end of an interval, with the duration of the next one."""
     h, a, alpha = state[STEP], control[0], control[1]
     dx, dy = 0.0, 0.0
     for i in range(2):
@@ -80,9 +80,9 @@ def interval_end(
         dx += 0.5 * h * point.speed * math.cos(point.heading)
         dy += 0.5 * h * point.speed * math.sin(point.heading)
     if is_kinematic:
-        return state[X] + dx, state[Y] + dy, state[THETA] + h * alpha, a, alpha, h
+        return state[X] + dx, state[Y] + dy, state[THETA] + h * alpha, a, alpha, step_ratio * h
     theta = state[THETA] + h * state[OMEGA] + 0.5 * h * h * alpha
-    return state[X] + dx, state[Y] + dy, theta, state[V] + h * a, state[OMEGA] + h * alpha, h
+    return state[X] + dx, state[Y] + dy, theta, state[V] + h * a, state[OMEGA] + h * alpha, step_ratio * h
 
 
 @inner_kernel
@@ -90,6 +90,7 @@ def add_derivatives(
     is_kinematic: bool,
     state: NDArray[np.float64],
     control: NDArray[np.float64],
+    step_ratio: float,
     costate: NDArray[np.float64],
     jacobian: NDArray[np.float64],
     hessian: NDArray[np.float64],
@@ -101,6 +102,7 @@ def add_derivatives(
         is_kinematic: whether the velocities jump.
         state: shape (STATES,).
         control: shape (CONTROLS,).
+        step_ratio: duration of the next interval, in terms of that of this one.
         costate: multipliers p of f, shape (STATES,).
         jacobian: overwritten by df/dw, shape (STATES, COLUMNS).
         hessian: the second derivative of p . f is added to its lower triangle, shape (COLUMNS, COLUMNS).
@@ -110,7 +112,8 @@ def add_derivatives(
     for i in range(STATES):
         for j in range(COLUMNS):
             jacobian[i, j] = 1.0 if i == j else 0.0
-    end[0], end[1], end[2], end[3], end[4], end[5] = interval_end(is_kinematic, state, control)
+    end[0], end[1], end[2], end[3], end[4], end[5] = interval_end(is_kinematic, state, control, step_ratio)
+    jacobian[STEP, STEP] = step_ratio
     if is_kinematic:
         jacobian[V, V] = jacobian[OMEGA, OMEGA] = 0.0
         jacobian[V, A] = jacobian[OMEGA, ALPHA] = 1.0

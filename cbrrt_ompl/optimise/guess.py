@@ -29,7 +29,8 @@ class Guess(NamedTuple):
     """States and controls for the solver to start from."""
 
     states: NDArray[np.float64]
-    """Rows of (x, y, theta, v, omega, h), theta without jumps, shape (N + 1, 6)."""
+    """Rows of (x, y, theta, v, omega, h), theta without jumps, shape (N + 1, 6); h is the duration of the interval that
+    begins there, a whole multiple of the shortest one's."""
     controls: NDArray[np.float64]
     """Rows of (a, alpha), shape (N, 2); in a solution for a kinematic robot the velocities (v, omega)."""
     source: str
@@ -38,7 +39,13 @@ class Guess(NamedTuple):
     @property
     def duration(self) -> float:
         """Of all intervals [s]."""
-        return float(len(self.controls) * self.states[0, STEP])
+        return float(self.states[:-1, STEP].sum())
+
+    @property
+    def multiples(self) -> NDArray[np.int64]:
+        """Durations of the intervals, in terms of the shortest one, shape (N,)."""
+        h = self.states[:-1, STEP]
+        return np.round(h / h.min()).astype(np.int64)
 
 
 def interval_count(duration: float, limits: Limits) -> int:
@@ -84,17 +91,23 @@ def with_controls(states: NDArray[np.float64], h: float, source: str) -> Guess:
 
 def refined(guess: Guess, *, is_kinematic: bool) -> Guess:
     """The same motion in twice as many intervals."""
-    n = len(guess.controls)
-    h = 0.5 * guess.states[0, STEP]
-    states = np.empty((2 * n + 1, 6))
-    states[::2] = guess.states
-    before, a = guess.states[:-1], guess.controls
-    states[1::2] = 0.5 * (guess.states[1:] + before)
+    return split(guess, np.ones(len(guess.controls), dtype=np.bool_), is_kinematic=is_kinematic)
+
+
+def split(guess: Guess, chosen: NDArray[np.bool_], *, is_kinematic: bool) -> Guess:
+    """The same motion with some of its intervals, chosen by an array of shape (N,), cut in two."""
+    index = np.repeat(np.arange(len(chosen)), 1 + chosen)  # the interval that a new one is of
+    is_second = np.append(False, index[1:] == index[:-1])
+    before, after, a = guess.states[:-1], guess.states[1:], guess.controls
+    h = np.where(chosen, 0.5, 1.0) * before[:, STEP]
+    middle = 0.5 * (after + before)
     if is_kinematic:
-        states[1::2, V : OMEGA + 1] = a
-    states[1::2, THETA] = before[:, THETA] + h * (a[:, 1] if is_kinematic else before[:, OMEGA] + 0.5 * h * a[:, 1])
-    states[:, STEP] = h
-    return Guess(states, np.repeat(a, 2, axis=0), guess.source)
+        middle[:, V : OMEGA + 1] = a
+    middle[:, THETA] = before[:, THETA] + h * (a[:, 1] if is_kinematic else before[:, OMEGA] + 0.5 * h * a[:, 1])
+    states = np.where(is_second[:, None], middle[index], before[index])
+    states[:, STEP] = h[index]
+    last = np.append(after[-1, :STEP], states[-1, STEP])
+    return Guess(np.vstack([states, last]), a[index], guess.source)
 
 
 def smoothed(values: NDArray[np.float64], width: int = 5) -> NDArray[np.float64]:

@@ -29,7 +29,7 @@ from cbrrt_ompl.trajectory.trajectory import Trajectory
 TIME_LIMIT = 1.0
 """Time that :func:`improve` takes at most where nothing else is asked for [s]."""
 
-ITERATIONS_A_GUESS = 200
+ITERATIONS_A_GUESS = 400
 """Newton steps that one guess is worth, its repairs included."""
 
 ROUGH, FINE = 1e-4, 1e-6
@@ -158,9 +158,16 @@ class Improver:
             self.run([guess, *geodesic_guesses(self._scenario)])
 
     def run(self, guesses: list[Guess]) -> None:
-        """Try guesses, the shortest first, and then refine the best of what came of them."""
-        for guess in sorted(guesses, key=lambda guess: guess.duration):
+        """Try guesses, the shortest first, and then refine the best of what came of them.
+
+        Where nothing came of any, they are tried again in twice as many intervals.
+        """
+        guesses = sorted(guesses, key=lambda guess: guess.duration)
+        for guess in guesses:
             self.try_guess(guess)
+        if self._best_guess is None:
+            for guess in guesses:
+                self.try_guess(refined(guess, is_kinematic=False))
         self.refine()
 
     def explore(self, guesses: Iterator[Guess]) -> None:

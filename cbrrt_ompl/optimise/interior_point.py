@@ -127,6 +127,7 @@ def evaluate(problem: Record, distances: NDArray[np.float32], stages: Records, p
                 problem.is_kinematic,
                 stage.state,
                 stage.control,
+                stage.step_ratio,
                 stages[k + 1].costate,
                 stage.jacobian,
                 stage.hessian,
@@ -296,7 +297,7 @@ def try_step(
             progress.trial_logarithms += math.log(slack)
             progress.trial_violation += abs(value - slack)
         if k < last:
-            end = interval_end(problem.is_kinematic, state, control)
+            end = interval_end(problem.is_kinematic, state, control, stage.step_ratio)
             for i in range(STATES):
                 progress.trial_violation += abs(end[i] - stages[k + 1].trial_state[i])
             progress.trial_cost += stage_cost(problem, distances, state, control)

@@ -1,7 +1,8 @@
-"""The optimal control problem as the kernels see it: multiple shooting over N intervals of one common, free duration.
+"""The optimal control problem as the kernels see it: multiple shooting over N intervals of a free duration.
 
-Stage k holds the state z_k = (x, y, theta, v, omega, h) and the control u_k = (a, alpha), constant over the interval; h
-is its duration, a state that never changes. With w_k = (z_k, u_k) the problem is
+Stage k holds the state z_k = (x, y, theta, v, omega, h) and the control u_k = (a, alpha), constant over the interval;
+h is its duration, a state that changes by a given factor from stage to stage, mostly 1. With w_k = (z_k, u_k) the
+problem is
 
     minimise    sum_k l(w_k)
     subject to  z_{k+1} = f(w_k),  g_k(w_k) >= 0,  z_0 given but for h.
@@ -68,6 +69,7 @@ STAGE = np.dtype(
     [
         ("margin", np.float64),  # distance that the discs keep from everything [m]
         ("speed_cap", np.float64),  # fraction of the velocity limits that may be used
+        ("step_ratio", np.float64),  # h of the next stage, in terms of that of this one
         ("state", np.float64, (STATES,)),  # z
         ("control", np.float64, (CONTROLS,)),  # u
         ("costate", np.float64, (STATES,)),  # multipliers p of the dynamics that end here

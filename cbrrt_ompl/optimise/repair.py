@@ -1,4 +1,4 @@
-"""Solve, check the exact motion, and solve again with larger margins where it comes too close."""
+"""Solve, check the exact motion, and solve again where it comes too close: with shorter intervals or larger margins."""
 
 from __future__ import annotations
 
@@ -11,19 +11,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cbrrt_ompl.optimise.clearance import clearances, is_motion_free, least_clearance, unsafe_rows
-from cbrrt_ompl.optimise.guess import Guess
+from cbrrt_ompl.optimise.guess import Guess, split
+from cbrrt_ompl.optimise.program import STEP
 from cbrrt_ompl.optimise.transcription import Transcription
+from cbrrt_ompl.problem.robot import Footprint
 from cbrrt_ompl.problem.settings import State
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 
-ROUNDS = 6
+ROUNDS = 10
 """Solutions that are tried for one guess."""
+
+ITERATIONS_A_SOLUTION = 200
+"""Newton steps of each of them at most."""
 
 SOLVED_TO = 1e-3
 """Violation of a constraint up to which a solution is worth rolling out."""
 
 FIRST_BARRIER, WARM_BARRIER = 0.03, 1e-3
 """Barrier parameters to start with: from a guess, and from a solution with other margins."""
+
+DEEPEST = 0.01
+"""How much nearer than at both of its nodes an interval may come to something before it is cut in two [m]: larger
+margins at its nodes would close narrow passages."""
+
+SMALL_LACK = 0.0025
+"""What an interval may lack for which larger margins at its nodes will do [m]."""
+
+SPACING, MOST_PARTS = 0.01, 16
+"""Way between the rows that are looked at [m], as far as this many for each row of the trajectory allow it."""
+
+SHORTEST_WAY = 0.05
+"""Way of any point of the footprint in an interval that is not cut any more, at most [m]."""
+
+MOST_INTERVALS = 900
+"""Intervals of a solution after which none is cut any more."""
 
 TARGET = 0.001
 """Room beyond the least clearance that the footprint is to have at all rows [m]."""
@@ -61,19 +82,19 @@ def solve_and_repair(
     Returns:
         A trajectory that is free, within all limits and in the goal region; None where the guess leads to none.
     """
-    scenario, n = transcription.scenario, len(guess.controls)
-    margins: NDArray[np.float64] = np.full(n + 1, transcription.margin)
-    caps = np.ones(n + 1)
+    scenario = transcription.scenario
+    margins: NDArray[np.float64] = np.full(len(guess.states), transcription.margin)
+    caps = np.ones(len(guess.states))
     barrier, spent = WARM_BARRIER if is_warm else FIRST_BARRIER, 0
     for _ in range(ROUNDS):
         solution = transcription.solve(
             guess, margins, caps, barrier, last_barrier, partial(_allowed, may_iterate, spent)
         )
         spent += solution.iterations
-        if not (solution.infeasibility < SOLVED_TO and solution.cost < most_cost):
+        if not (solution.iterations and solution.infeasibility < SOLVED_TO and solution.cost < most_cost):
             return None
         guess, barrier = solution.guess, WARM_BARRIER
-        trajectory = transcription.trajectory(guess)
+        trajectory, rows = transcription.trajectory(guess), transcription.rows(guess)
         if scenario.goal.violations(State(*trajectory.states[-1].tolist())):
             return None
         dt = float(trajectory.t[1] - trajectory.t[0])
@@ -81,38 +102,85 @@ def solve_and_repair(
         if free and (trajectory.kinematic or not scenario.planning.brake_safe):
             return Improvement(trajectory, guess)
         if free:
-            unsafe = by_interval(unsafe_rows(trajectory.states, scenario), n)
+            unsafe = by_interval(unsafe_rows(trajectory.states, scenario), rows)
             if not unsafe.any():
                 return Improvement(trajectory, guess)
             caps *= np.where(at_nodes(unsafe), SLOWER, 1.0)
-        else:
-            margins = margins + missing_margin(transcription, trajectory, n)
+            continue
+        ways = ways_of(trajectory.states, guess, rows, scenario.robot.footprint)
+        finer = rows * int(min(math.ceil((ways / rows).max() / SPACING), MOST_PARTS))
+        nearest = clearances(transcription.roll_out(guess, finer), scenario)
+        lack = missing_margin(nearest, least_clearance(scenario), finer)
+        is_deep = (lack > SMALL_LACK) & (depths(nearest, finer) > DEEPEST) & (ways > SHORTEST_WAY)
+        is_deep |= np.append(is_deep[1:], False) | np.append(False, is_deep[:-1])
+        is_deep &= len(rows) < MOST_INTERVALS
+        margins = margins + at_nodes(np.where(is_deep, 0.0, lack))
+        if is_deep.any():
+            guess = split(guess, is_deep, is_kinematic=transcription.is_kinematic)
+            kept = np.append(np.repeat(np.arange(len(rows)), 1 + is_deep), len(rows))
+            margins, caps = margins[kept], caps[kept]
     return None
 
 
 def _allowed(may_iterate: Callable[[int], int], spent: int, done: int) -> int:
     """Newton steps that are left after some of this solution and those of the ones before."""
-    return may_iterate(spent + done)
+    return min(may_iterate(spent + done), ITERATIONS_A_SOLUTION - done)
 
 
-def missing_margin(transcription: Transcription, trajectory: Trajectory, intervals: int) -> NDArray[np.float64]:
-    """What is to be added to the margins at the nodes of a motion that is not free, shape (intervals + 1,) [m]."""
-    scenario = transcription.scenario
-    nearest = -by_interval(-clearances(trajectory.states, scenario), intervals)
-    lack = TARGET + least_clearance(scenario) - nearest
+def ways_of(
+    states: NDArray[np.float64], guess: Guess, rows: NDArray[np.int64], footprint: Footprint
+) -> NDArray[np.float64]:
+    """Bound on the way of any point of the footprint in each interval, shape (N,) [m].
+
+    Args:
+        states: rows of (x, y, theta, v, omega) [m, m, rad, m/s, rad/s].
+        guess: whose motion it is.
+        rows: of each interval.
+        footprint: the robot's area.
+    """
+    speeds = np.abs(states[:, 3]) + footprint.circumscribed_radius * np.abs(states[:, 4])
+    found: NDArray[np.float64] = by_interval(speeds, rows) * guess.states[:-1, STEP]
+    return found
+
+
+def depths(nearest: NDArray[np.float64], rows: NDArray[np.int64]) -> NDArray[np.float64]:
+    """How much nearer each interval comes to something than its nodes, shape (N,) [m].
+
+    Args:
+        nearest: clearance of each row [m].
+        rows: of each interval.
+    """
+    nodes = np.append(0, np.cumsum(rows))
+    found: NDArray[np.float64] = np.minimum(nearest[nodes[:-1]], nearest[nodes[1:]]) + by_interval(-nearest, rows)
+    return found
+
+
+def missing_margin(nearest: NDArray[np.float64], least: float, rows: NDArray[np.int64]) -> NDArray[np.float64]:
+    """What is to be added to the margins in the intervals of a motion that is not free, shape (N,) [m].
+
+    Args:
+        nearest: clearance of each row [m].
+        least: clearance to keep [m].
+        rows: of each interval.
+    """
+    within = -by_interval(-nearest, rows)
+    lack = TARGET + least - within
     if lack.max() <= 0.0:  # the rows are far enough from everything, a point between two of them is not
-        lack = 0.002 - (nearest - nearest.min())
-    return at_nodes(np.where(lack > 0.0, 1.3 * lack + 0.001, 0.0))
+        lack = 0.002 - (within - within.min())
+    return np.where(lack > 0.0, 1.3 * lack + 0.001, 0.0)
 
 
-def by_interval(rows: NDArray[Any], intervals: int) -> NDArray[Any]:
-    """The largest value of the rows of each interval, its first and last included, shape (intervals,).
+def by_interval(values: NDArray[Any], rows: NDArray[np.int64]) -> NDArray[Any]:
+    """The largest value of the rows of each interval, its first and last included, shape (N,).
 
     What there is after the last interval, where the robot stands, does not count.
+
+    Args:
+        values: one for each row of the trajectory.
+        rows: of each interval.
     """
-    parts = (len(rows) - 1) // intervals
-    inner = rows[: intervals * parts].reshape(intervals, parts).max(axis=1)
-    return np.maximum(inner, rows[parts::parts][:intervals])
+    ends = np.cumsum(rows)
+    return np.maximum(np.maximum.reduceat(values[: ends[-1]], ends - rows), values[ends])
 
 
 def at_nodes(values: NDArray[Any]) -> NDArray[Any]:

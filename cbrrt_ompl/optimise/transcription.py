@@ -50,7 +50,7 @@ ITERATIONS_AT_ONCE = 16
 """Newton steps between two looks at the clock."""
 
 MOST_ROWS = 1000
-"""Rows of a trajectory for an interval at most, however short the planners' step is."""
+"""Rows of a trajectory for the shortest interval at most, however short the planners' step is."""
 
 
 @dataclass
@@ -107,8 +107,11 @@ class Transcription:
             last_barrier: its last value.
             may_iterate: takes the number of Newton steps so far and says how many more there may be.
         """
-        stages = record_array(len(guess.states), STAGE)
+        stages, multiples = record_array(len(guess.states), STAGE), guess.multiples
         stages["state"] = guess.states
+        stages["state"][:-1, STEP] = multiples * (guess.duration / multiples.sum())
+        stages["state"][-1, STEP] = stages["state"][-2, STEP]
+        stages["step_ratio"], stages["step_ratio"][:-2] = 1.0, multiples[1:] / multiples[:-1]
         stages["control"][:-1] = guess.states[1:, V : OMEGA + 1] if self.is_kinematic else guess.controls
         stages["margin"], stages["speed_cap"] = margins, speed_caps
         progress = record_array(1, PROGRESS)[0]
@@ -133,16 +136,28 @@ class Transcription:
         Its rows are evenly spaced, at most an integration step apart. A kinematic robot that is to arrive at rest
         stands in one more step.
         """
-        limits, h = self.scenario.robot.limits, float(guess.states[0, STEP])
-        parts = min(max(1, math.ceil(h / self.scenario.planning.step - 1e-9)), MOST_ROWS)
-        begin = np.array(self.scenario.start, dtype=float)
-        states = roll_out_controls(begin, guess.controls, h / parts, parts, limits, self.is_kinematic)
+        rows = self.rows(guess)
+        states, dt = self.roll_out(guess, rows), guess.duration / rows.sum()
         most = self.scenario.goal.speed_tolerance
         if self.is_kinematic and most is not None and np.abs(states[-1, 3:]).max() > most:
             states = np.concatenate([states, [[*states[-1, :3], 0.0, 0.0]]])
         commands = np.concatenate([states[1:, 3:], states[-1:, 3:]])
-        t: NDArray[np.float64] = h / parts * np.arange(len(states), dtype=float)
-        return Trajectory(t, *states.T, *commands.T, kinematic=self.is_kinematic, limits=limits)
+        t: NDArray[np.float64] = dt * np.arange(len(states), dtype=float)
+        return Trajectory(t, *states.T, *commands.T, kinematic=self.is_kinematic, limits=self.scenario.robot.limits)
+
+    def roll_out(self, guess: Guess, rows: NDArray[np.int64]) -> NDArray[np.float64]:
+        """The states that the controls lead to, with some rows for each interval after that of the start."""
+        begin, dt = np.array(self.scenario.start, dtype=float), guess.duration / rows.sum()
+        states: NDArray[np.float64] = roll_out_controls(
+            begin, guess.controls, dt, rows, self.scenario.robot.limits, self.is_kinematic
+        )
+        return states
+
+    def rows(self, guess: Guess) -> NDArray[np.int64]:
+        """Rows of the trajectory for each interval, after that of the start, shape (N,)."""
+        multiples = guess.multiples
+        shortest = guess.duration / multiples.sum()
+        return multiples * min(max(1, math.ceil(shortest / self.scenario.planning.step - 1e-9)), MOST_ROWS)
 
 
 def fill_rows(problem: Record, name: str, rows: NDArray[np.float64]) -> None:
@@ -215,17 +230,17 @@ def roll_out_controls(
     begin: NDArray[np.float64],
     controls: NDArray[np.float64],
     dt: float,
-    parts: int,
+    rows: NDArray[np.int64],
     limits: Limits,
     is_kinematic: bool,
 ) -> NDArray[np.float64]:
-    """States (x, y, theta, v, omega) under controls, several rows a control, the limits of the velocities kept."""
-    states = np.empty((len(controls) * parts + 1, 5))
+    """States (x, y, theta, v, omega) under controls, some rows a control, the limits of the velocities kept."""
+    states, written = np.empty((rows.sum() + 1, 5)), 0
     states[0] = begin
     x, y, theta, v, omega = begin[0], begin[1], begin[2], begin[3], begin[4]
     for k in range(len(controls)):
         v_before, omega_before, first, second = v, omega, controls[k, 0], controls[k, 1]
-        for i in range(1, parts + 1):
+        for i in range(1, rows[k] + 1):
             if is_kinematic:
                 v_next, omega_next = first, second
             else:
@@ -236,6 +251,7 @@ def roll_out_controls(
                 v, omega = v_next, omega_next
             x, y, theta = unicycle_step(x, y, theta, v, omega, v_next, omega_next, dt)
             v, omega = v_next, omega_next
-            row = states[k * parts + i]
+            written += 1
+            row = states[written]
             row[0], row[1], row[2], row[3], row[4] = x, y, theta, v, omega
     return states

@@ -26,7 +26,8 @@ def read_map_server(path: Path) -> MapFile:
     """Cells, resolution and origin of a ROS map.
 
     Required are ``image``, ``resolution`` and ``origin``. Where they are left out, ``mode`` is ``trinary``, ``negate``
-    0, ``occupied_thresh`` 0.65 and ``free_thresh`` 0.196. Other keys are skipped.
+    0, ``occupied_thresh`` 0.65 and ``free_thresh`` 0.196, or ``occupied_thresh`` where that is less. Other keys are
+    skipped.
 
     The image is looked for where the file says: relative to the YAML file, absolute, or under the home folder (``~``);
     and, for files that came from another machine, by its name beside the YAML file, with a remark.
@@ -143,7 +144,8 @@ def _reading(data: Mapping[object, object], problems: list[Problem]) -> Reading:
     negate = data.get("negate", 0)
     if not (isinstance(negate, int) and negate in (0, 1)):
         problems.append(Problem("negate", negate, "0 or 1"))
-    free, occupied = data.get("free_thresh", FREE_THRESHOLD), data.get("occupied_thresh", OCCUPIED_THRESHOLD)
+    occupied = data.get("occupied_thresh", OCCUPIED_THRESHOLD)
+    free = data.get("free_thresh", min(FREE_THRESHOLD, occupied) if is_number(occupied) else FREE_THRESHOLD)
     wrong = [
         Problem(name, value, "a number from 0 to 1")
         for name, value in (("occupied_thresh", occupied), ("free_thresh", free))
