@@ -12,10 +12,12 @@ import numpy as np
 from independent_checker import refusals
 
 from cbrrt_ompl.errors import ScenarioError
+from cbrrt_ompl.optimise.improving import improve
 from cbrrt_ompl.planning import plan
 from cbrrt_ompl.problem.settings import State
 from cbrrt_ompl.scenario.scenario import Scenario, scenario_from_dict, scenario_to_dict
 from cbrrt_ompl.trajectory.columns import COLUMNS
+from cbrrt_ompl.trajectory.trajectory import Trajectory
 from cbrrt_ompl.verification import verify
 
 Generator = np.random.Generator
@@ -25,6 +27,9 @@ COMPILED = ("cb-rrt-compiled", "s-rrt-compiled")
 
 IN_TURN = ("cb-rrt", "s-rrt", "cb-rrt-robust")
 """Planners of which each world takes the next."""
+
+IMPROVED = "improve"
+"""In place of a planner: what `improve` made of a trajectory."""
 
 
 class Outcome(NamedTuple):
@@ -39,9 +44,13 @@ class Outcome(NamedTuple):
     """Why `verify` refuses the trajectory."""
     error: str
     """The traceback of an exception; empty where there was none."""
+    gain: float = 0.0
+    """Seconds by which an improved trajectory takes less time than what was given."""
 
 
-def outcomes(seed: int, world: int, max_samples: int, time_limit: float = 5.0) -> Iterator[Outcome]:
+def outcomes(
+    seed: int, world: int, max_samples: int, time_limit: float = 5.0, improve_for: float | None = None
+) -> Iterator[Outcome]:
     """Plan in one random world with several planners, and check what they call solved.
 
     Args:
@@ -49,20 +58,30 @@ def outcomes(seed: int, world: int, max_samples: int, time_limit: float = 5.0) -
         world: number of the world in it: each can be made alone.
         max_samples: samples of a plan.
         time_limit: largest time of a plan [s].
+        improve_for: time to improve each of them for [s]; the outcomes of that go by ``IMPROVED``.
     """
     scenario = world_of(seed, world, max_samples)
     for planner in (*COMPILED, IN_TURN[world % len(IN_TURN)]):
+        name = planner
         try:
-            trajectory = plan(scenario, planner, seed=world, time_limit=time_limit).trajectory
-            if trajectory is None:
+            given = plan(scenario, planner, seed=world, time_limit=time_limit).trajectory
+            if given is None:
                 yield Outcome(world, planner, False, [], [], "")
                 continue
-            columns = {name: getattr(trajectory, name).tolist() for name in COLUMNS}
-            by_checker = refusals(scenario_to_dict(scenario), columns, trajectory.kinematic)
-            by_verify = [violation.message for violation in verify(trajectory, scenario).violations]
-            yield Outcome(world, planner, True, by_checker, by_verify, "")
+            yield Outcome(world, planner, True, *judged(given, scenario), "")
+            if improve_for is not None:
+                name = IMPROVED
+                better = improve(given, scenario, improve_for)
+                yield Outcome(world, name, True, *judged(better, scenario), "", given.duration - better.duration)
         except Exception:  # whatever it is, the other worlds go on
-            yield Outcome(world, planner, False, [], [], traceback.format_exc())
+            yield Outcome(world, name, False, [], [], traceback.format_exc())
+
+
+def judged(trajectory: Trajectory, scenario: Scenario) -> tuple[list[str], list[str]]:
+    """What the independent checker and `verify` have against a trajectory."""
+    columns = {name: getattr(trajectory, name).tolist() for name in COLUMNS}
+    by_checker = refusals(scenario_to_dict(scenario), columns, trajectory.kinematic)
+    return by_checker, [violation.message for violation in verify(trajectory, scenario).violations]
 
 
 def world_of(seed: int, world: int, max_samples: int) -> Scenario:

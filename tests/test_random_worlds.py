@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 import pytest
-from generated_worlds import COMPILED, IN_TURN, outcomes
+from generated_worlds import COMPILED, IN_TURN, judged, outcomes, world_of
 from independent_checker import Surroundings, driven, refusals
+
+from cbrrt_ompl import improve, plan
 
 SEED = 2
 
@@ -45,6 +48,25 @@ def test_every_trajectory_called_solved_passes_both_checkers() -> None:
             assert (one.by_checker, one.by_verify, one.error) == ([], [], ""), f"world {world}, {one.planner}"
             counts[one.planner] += one.solved
     assert all(counts[planner] >= 2 for planner in (*COMPILED, *IN_TURN)), counts
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("worlds", [range(12), (29, 125, 239, 305, 10, 12, 99)], ids=["first", "hard"])
+def test_nearly_all_of_them_are_improved_and_pass_both_checkers(worlds: Iterable[int]) -> None:
+    """Hard are starts within half a millimetre of something, and corners that a point passes between two nodes."""
+    given, shorter = 0, 0
+    for world in worlds:
+        scenario = world_of(3, world, max_samples=2000)
+        for planner in ("cb-rrt-robust", "s-rrt-compiled"):
+            trajectory = plan(scenario, planner, seed=world, time_limit=60.0).trajectory
+            if trajectory is None or trajectory.duration == 0.0:
+                continue
+            better = improve(trajectory, scenario, max_iterations=400)
+            assert judged(better, scenario) == ([], []), f"world {world}, {planner}"
+            assert better.duration <= trajectory.duration
+            given, shorter = given + 1, shorter + (better.duration < trajectory.duration)
+    assert given >= 10
+    assert shorter >= 0.9 * given
 
 
 def test_the_checker_accepts_what_is_right() -> None:

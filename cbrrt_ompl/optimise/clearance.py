@@ -50,6 +50,12 @@ def clearances(states: NDArray[np.float64], scenario: Scenario) -> NDArray[np.fl
     return found
 
 
+def signed_clearances(states: NDArray[np.float64], scenario: Scenario) -> NDArray[np.float64]:
+    """:func:`clearances`, but where the footprint touches something, about how deep, by the distance field [m]."""
+    found, by_field = clearances(states, scenario), disc_distances(states, scenario).min(axis=1)
+    return np.where(found > 0.0, found, np.minimum(by_field, 0.0))
+
+
 def unsafe_rows(states: NDArray[np.float64], scenario: Scenario) -> NDArray[np.bool_]:
     """From which states the robot cannot brake to rest without collision, shape (n,)."""
     step = scenario.planning.step

@@ -17,7 +17,9 @@ from cbrrt_ompl.errors import Problem, SettingsError, TrajectoryError
 from cbrrt_ompl.optimise.clearance import clearances
 from cbrrt_ompl.optimise.guess import Guess, guess_from_trajectory, refined
 from cbrrt_ompl.optimise.guesses import AHEAD, BACKWARDS, geodesic, guess_along
+from cbrrt_ompl.optimise.lead import begun_later, joined, lead_rows, split
 from cbrrt_ompl.optimise.objective import Objective
+from cbrrt_ompl.optimise.program import STEP
 from cbrrt_ompl.optimise.repair import solve_and_repair
 from cbrrt_ompl.optimise.transcription import Transcription
 from cbrrt_ompl.problem.obstacles import Bounds, Box
@@ -138,6 +140,7 @@ class Improver:
         self._scenario, self._objective = scenario, objective
         is_kinematic = is_kinematic or scenario.robot.limits.is_first_order
         self._transcription = Transcription(scenario, objective, is_kinematic=is_kinematic)
+        self._lead: Trajectory | None = None
         self._max_iterations = max_iterations
         self._callback, self._should_stop = callback, should_stop
         self._best_guess: Guess | None = None
@@ -151,7 +154,18 @@ class Improver:
         self._began, self._deadline = began, time.perf_counter() + time_limit
 
     def improve(self, trajectory: Trajectory, source: str) -> None:
-        """Adopt a trajectory that passed all checks, and try it and the geodesics as guesses."""
+        """Adopt a trajectory that passed all checks, and try it and the geodesics as guesses.
+
+        What comes before the robot has the room that a motion needs is kept as it is.
+        """
+        if self.best is None:
+            row = lead_rows(trajectory, self._scenario, self._transcription.margin)
+            if row > 0:
+                self._lead, trajectory = split(trajectory, row)
+                self._scenario = begun_later(self._scenario, self._lead)
+                self._transcription = Transcription(
+                    self._scenario, self._objective, is_kinematic=self._transcription.is_kinematic
+                )
         self.adopt(trajectory, source)
         if trajectory.duration > 0.0 and not self.has_ended():
             guess = guess_from_trajectory(trajectory, self._scenario.robot.limits, f"{source}, optimised")
@@ -179,12 +193,16 @@ class Improver:
                 return
 
     def adopt(self, trajectory: Trajectory, source: str, guess: Guess | None = None) -> bool:
-        """Keep a trajectory that passed all checks, where it is better than the best; says whether it is."""
+        """Keep a trajectory that passed all checks, where it is better than the best; says whether it is.
+
+        It begins where the lead ends, if there is one.
+        """
         cost = self._objective.cost(trajectory, self._scenario)
         if not cost < self._best_cost - LEAST_GAIN:
             return False
-        self.best, self._best_cost, self._best_guess = trajectory, cost, guess
-        self.history.append(Found(self.elapsed(), trajectory.duration, source))
+        self.best = trajectory if self._lead is None else joined(self._lead, trajectory)
+        self._best_cost, self._best_guess = cost, guess
+        self.history.append(Found(self.elapsed(), self.best.duration, source))
         if self._callback is not None:
             self._callback(self.history[-1])
         return True
@@ -194,6 +212,8 @@ class Improver:
         if self.has_ended():
             return False
         before = self.iterations
+        if self._lead is not None:
+            guess.states[0, :STEP] = self._scenario.start
 
         def may_iterate(done: int) -> int:
             self.iterations = before + done

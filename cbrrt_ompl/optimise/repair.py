@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cbrrt_ompl.optimise.clearance import clearances, is_motion_free, least_clearance, unsafe_rows
+from cbrrt_ompl.optimise.clearance import is_motion_free, least_clearance, signed_clearances, unsafe_rows
 from cbrrt_ompl.optimise.guess import Guess, split
 from cbrrt_ompl.optimise.program import STEP
 from cbrrt_ompl.optimise.transcription import Transcription
@@ -109,7 +109,7 @@ def solve_and_repair(
             continue
         ways = ways_of(trajectory.states, guess, rows, scenario.robot.footprint)
         finer = rows * int(min(math.ceil((ways / rows).max() / SPACING), MOST_PARTS))
-        nearest = clearances(transcription.roll_out(guess, finer), scenario)
+        nearest = signed_clearances(transcription.roll_out(guess, finer), scenario)
         lack = missing_margin(nearest, least_clearance(scenario), finer)
         is_deep = (lack > SMALL_LACK) & (depths(nearest, finer) > DEEPEST) & (ways > SHORTEST_WAY)
         is_deep |= np.append(is_deep[1:], False) | np.append(False, is_deep[:-1])
