@@ -19,6 +19,7 @@ from cbrrt_ompl.kernels.beside import compiled_beside
 from cbrrt_ompl.motion.model import ROOM, check_step, jumps, make_model
 from cbrrt_ompl.ompl_plugin.availability import check_ompl, has_ompl
 from cbrrt_ompl.optimise.anytime import further_guesses, robust_search
+from cbrrt_ompl.optimise.guess import Guess
 from cbrrt_ompl.optimise.improving import Found, Improver, check_improvement, geodesic_guesses
 from cbrrt_ompl.optimise.improving import warm_up as warm_up_improvement
 from cbrrt_ompl.optimise.interior_point import iterate
@@ -213,14 +214,16 @@ def _plan_anytime(
     watch.start()
     improver.begin(watch.left(), watch.began)
     search.run(watch.should_stop, min(FIRST_SAMPLES, most))
+    others: list[Guess] | None = None
     if not search.has_reached_goal:
         improver.run(geodesic_guesses(scenario))
+        others = []  # the geodesics have been tried
         if improver.best is None:
             search.run(watch.should_stop, most)
     result = _result_of(search.first_plan(watch.elapsed()), planner, seed, watch.ended_by)
     improver.begin(budget, watch.began)
     if search.has_reached_goal:
-        improver.improve(search.trajectory(), planner)
+        improver.improve(search.trajectory(), planner, others)
     if improver.best is not None:
         improver.explore(further_guesses(scenario, search, first_seed, improver.has_ended))
     return _with_best(result, improver)

@@ -12,7 +12,8 @@ import pytest
 
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import SettingsError, TrajectoryError
-from cbrrt_ompl.optimise import Found, Objective, improve
+from cbrrt_ompl.optimise import Found, Objective, improve, improving
+from cbrrt_ompl.optimise.improving import Improver
 from cbrrt_ompl.planning import plan
 from cbrrt_ompl.problem.obstacles import Bounds, Box, Disc, Polygon
 from cbrrt_ompl.problem.ready_robots import ROBOTS, rectangle
@@ -212,6 +213,35 @@ def test_a_fast_robot_with_corners_is_improved_through_doors_in_thin_walls(footp
     better = improve(planned(scenario), scenario, max_iterations=2000)
     assert better.duration < 4.0
     assert verify(better, scenario).ok
+
+
+@pytest.mark.parametrize("heading", [1.0, -1.0])
+def test_a_long_way_through_a_hall_takes_few_iterations(heading: float) -> None:
+    """A line search that lowered the merit at every step took ever smaller ones, and the plan was left as it was."""
+    boxes = [Box((x, y), (x + 0.6, y + 0.6)) for x in range(20, 69, 12) for y in range(20, 69, 12)]
+    scenario = scenario_of(
+        world=World(Bounds((0.0, 0.0), (80.0, 80.0)), boxes),
+        robot=Robot(rectangle(1.2, 0.5), Limits(-1.0, 1.0, -1.0, 1.0, 0.6, 1.0)),
+        start=State(3.0, 5.0, heading),
+        goal=Goal(75.0, 62.0, tolerance=0.25),
+        planning=PlanningSettings(clearance=0.05),
+    )
+    better = improve(planned(scenario), scenario, max_iterations=200)
+    assert better.duration < 1.03 * math.hypot(72.0, 57.0)  # at 1 m/s
+    assert verify(better, scenario).ok
+
+
+def test_other_guesses_may_take_the_place_of_the_geodesics(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`cb-rrt-anytime` tried the geodesics a second time where they had led to nothing before a plan was found."""
+    scenario, asked = scenario_of(robot=BOX_ROBOT), []
+    monkeypatch.setattr(improving, "geodesic_guesses", lambda scenario: asked.append(scenario) or [])
+    given = planned(scenario)
+    for others, times in ((None, 1), ([], 1)):
+        improver = Improver(scenario, Objective(), max_iterations=400)
+        improver.improve(given, "given", others)
+        assert improver.best is not None
+        assert improver.best.duration < given.duration
+        assert len(asked) == times
 
 
 def test_discs_polygons_and_odd_footprints_are_handled() -> None:

@@ -15,7 +15,7 @@ from cbrrt_ompl.optimise.clearance import disc_distances
 from cbrrt_ompl.optimise.cover import cover
 from cbrrt_ompl.optimise.dynamics import add_derivatives, interval_end
 from cbrrt_ompl.optimise.field import Field, distance_and_gradient, field_of, make_field
-from cbrrt_ompl.optimise.guess import Guess, guess_from_trajectory, refined, split
+from cbrrt_ompl.optimise.guess import Guess, guess_from_trajectory, interval_count, refined, split
 from cbrrt_ompl.optimise.guesses import AHEAD, geodesic, guess_along
 from cbrrt_ompl.optimise.objective import Objective
 from cbrrt_ompl.optimise.program import COLUMNS, MOST_DISCS, STATES
@@ -181,6 +181,12 @@ def test_a_geodesic_bends_around_an_obstacle() -> None:
 def test_there_is_no_geodesic_through_a_closed_wall() -> None:
     world = World(Bounds((0.0, 0.0), (6.0, 4.0)), [Box((2.5, 0.0), (3.5, 4.0))])
     assert geodesic(Scenario(name="closed", world=world, start=State(1.0, 1.0), goal=Goal(5.0, 1.0))) is None
+
+
+def test_an_interval_of_a_guess_is_as_short_as_the_robot_is_fast() -> None:
+    """A fast robot had one every 0.9 m, between which it jumped over corners."""
+    assert interval_count(19.9, Limits(0.0, 3.0, -1.0, 1.0)) == 100
+    assert interval_count(19.9, Limits(-3.0, 1.0, -1.0, 1.0)) == 100
 
 
 def solution_in_the_open(*, is_kinematic: bool) -> tuple[Transcription, Guess]:

@@ -18,6 +18,9 @@ INTERVAL = 0.55
 TURN = 1.0
 """Turn in an interval at most, for the same [rad]: the rule that integrates it is then good to 3e-4 of its way."""
 
+LONGEST = 0.6
+"""Way in an interval at most, for the same [m]: constraints hold at its ends."""
+
 FEWEST, MOST = 45, 300
 """Range of the number of intervals."""
 
@@ -50,8 +53,10 @@ class Guess(NamedTuple):
 
 def interval_count(duration: float, limits: Limits) -> int:
     """Intervals for a motion of some seconds."""
-    fastest = max(limits.omega_max, -limits.omega_min)
-    return int(min(max(math.ceil(duration / min(INTERVAL, TURN / fastest)), FEWEST), MOST))
+    interval = min(
+        INTERVAL, TURN / max(limits.omega_max, -limits.omega_min), LONGEST / max(limits.v_max, -limits.v_min)
+    )
+    return int(min(max(math.ceil(duration / interval), FEWEST), MOST))
 
 
 def guess_from_trajectory(trajectory: Trajectory, limits: Limits, source: str) -> Guess:

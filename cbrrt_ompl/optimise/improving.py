@@ -153,14 +153,15 @@ class Improver:
         """Stop after a time from now on [s]; the history counts from another one, by `time.perf_counter` [s]."""
         self._began, self._deadline = began, time.perf_counter() + time_limit
 
-    def improve(self, trajectory: Trajectory, source: str) -> None:
-        """Adopt a trajectory that passed all checks, and try it and the geodesics as guesses.
+    def improve(self, trajectory: Trajectory, source: str, others: list[Guess] | None = None) -> None:
+        """Adopt a trajectory that passed all checks, and try it and others as guesses, the geodesics if not given.
 
         What comes before the robot has the room that a motion needs is kept as it is.
         """
         if self.best is None:
             row = lead_rows(trajectory, self._scenario, self._transcription.margin)
             if row > 0:
+                others = None  # those begin at the start
                 self._lead, trajectory = split(trajectory, row)
                 self._scenario = begun_later(self._scenario, self._lead)
                 self._transcription = Transcription(
@@ -169,7 +170,7 @@ class Improver:
         self.adopt(trajectory, source)
         if trajectory.duration > 0.0 and not self.has_ended():
             guess = guess_from_trajectory(trajectory, self._scenario.robot.limits, f"{source}, optimised")
-            self.run([guess, *geodesic_guesses(self._scenario)])
+            self.run([guess, *(geodesic_guesses(self._scenario) if others is None else others)])
 
     def run(self, guesses: list[Guess]) -> None:
         """Try guesses, the shortest first, and then refine the best of what came of them.

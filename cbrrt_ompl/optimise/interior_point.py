@@ -8,8 +8,10 @@ steps of these conditions, with the exact Hessian of the Lagrangian, are linear-
 
 It is the method of Waechter and Biegler, "On the implementation of an interior-point filter line-search algorithm for
 large-scale nonlinear programming", Mathematical Programming 106 (1), 2006, with this merit function in place of the
-filter; that its linear systems are Riccati recursions is shown by Rao, Wright and Rawlings, "Application of
-interior-point methods to model predictive control", Journal of Optimization Theory and Applications 99 (3), 1998.
+filter, in a line search that is not monotone near the end (Grippo, Lampariello and Lucidi, "A nonmonotone line search
+technique for Newton's method", SIAM Journal on Numerical Analysis 23 (4), 1986). That its linear systems are Riccati
+recursions is shown by Rao, Wright and Rawlings, "Application of interior-point methods to model predictive control",
+Journal of Optimization Theory and Applications 99 (3), 1998.
 """
 
 from __future__ import annotations
@@ -30,6 +32,13 @@ from cbrrt_ompl.optimise.riccati import factorise, roll_out_step
 SOLVE_NEW, SOLVE_RUNNING, SOLVE_CONVERGED, SOLVE_STUCK, SOLVE_SINGULAR = range(5)
 """State of a solution: not begun, under way, converged, no step helps, or no shift makes the problem convex."""
 
+MEMORY = 5
+"""Iterates whose merits a line search compares with: the largest of them may be reached again. Along a long way full
+steps are good and yet raise the merit for a while, since the motion is not linear in the headings."""
+
+MEMORY_BARRIER = 1e-3
+"""mu above which only the last one counts: far from a solution such steps lead astray."""
+
 PROGRESS = np.dtype(
     [
         ("status", np.int64),
@@ -38,6 +47,9 @@ PROGRESS = np.dtype(
         ("last_barrier", np.float64),  # mu at which to end
         ("least_slack", np.float64),  # what a slack starts with at least
         ("penalty", np.float64),  # nu
+        ("merits", np.float64, (MEMORY,)),  # of the last iterates under this mu and nu
+        ("merits_barrier", np.float64),  # mu and nu of those
+        ("merits_penalty", np.float64),
         ("damping", np.float64),  # shift that short steps of the line search ask for
         ("last_shift", np.float64),  # shift that made the problem convex the last time
         ("failures", np.int64),  # line searches in a row that found nothing
@@ -312,7 +324,7 @@ def move(problem: Record, distances: NDArray[np.float32], stages: Records, progr
         progress.penalty = min(2.0 * slope / (0.7 * violation) + 1.0, 1e8)
     descent = min(slope - progress.penalty * violation, 0.0)
     before = progress.cost - mu * progress.logarithms
-    merit = before + progress.penalty * violation
+    merit = remember_merit(progress, before + progress.penalty * violation)
     fraction, halvings, is_better = primal, 0, False
     while True:
         try_step(problem, distances, stages, progress, fraction)
@@ -332,6 +344,23 @@ def move(problem: Record, distances: NDArray[np.float32], stages: Records, progr
         progress.status = SOLVE_STUCK
     elif is_better or progress.trial_violation <= violation or reached <= before:
         accept(stages, mu, fraction, dual)
+
+
+@inner_kernel
+def remember_merit(progress: Record, merit: float) -> float:
+    """Enter the merit of the iterate, and return the largest one to compare with."""
+    merits = progress.merits
+    mu, nu = progress.barrier, progress.penalty
+    if mu > MEMORY_BARRIER or progress.merits_barrier != mu or progress.merits_penalty != nu:
+        progress.merits_barrier, progress.merits_penalty = mu, nu
+        for i in range(MEMORY):
+            merits[i] = merit
+    largest = merit
+    for i in range(MEMORY - 1, 0, -1):
+        merits[i] = merits[i - 1]
+        largest = max(largest, merits[i])
+    merits[0] = merit
+    return largest
 
 
 @inner_kernel
