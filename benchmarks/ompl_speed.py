@@ -21,7 +21,8 @@ from dataclasses import replace
 from cbrrt_ompl import Footprint, Goal, Robot, Scenario, load_scenario
 from cbrrt_ompl.ompl_plugin.binding import ou
 from cbrrt_ompl.ompl_plugin.compiled_methods import VARIABLE
-from cbrrt_ompl.ompl_plugin.run import quiet_ompl, run
+from cbrrt_ompl.ompl_plugin.rounds import Rounds
+from cbrrt_ompl.ompl_plugin.run import count_nodes, quiet_ompl
 from cbrrt_ompl.ompl_plugin.setup import make_setup
 from cbrrt_ompl.planners.registry import PLANNERS, Backend
 from cbrrt_ompl.planning import warm_up_planner
@@ -38,16 +39,15 @@ FOOTPRINTS = {
 
 def cost(scenario: Scenario, planner: str, rounds: int, seed: int) -> tuple[float, int]:
     """CPU time of some rounds [s], and the nodes they made."""
-    times: list[float] = []
-
-    def should_stop(count: int) -> bool:
-        if count < rounds:
-            return False
-        times.append(time.process_time())
-        return True
-
-    found = run(scenario, planner, seed, lambda: times.append(time.process_time()), should_stop)
-    return times[1] - times[0], found.count_nodes()
+    with quiet_ompl():
+        ou.RNG.setSeed(1 + seed)
+        setup = make_setup(scenario, planner)
+        setup.setup()
+        with Rounds(rounds, lambda _: False).condition() as condition:
+            began = time.process_time()
+            setup.solve(condition)
+            used = time.process_time() - began
+        return used, count_nodes(setup.getPlanner(), setup.getSpaceInformation())
 
 
 def costs(

@@ -26,7 +26,7 @@ from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
 if has_ompl():
     from ompl_rounds import solve
 
-    from cbrrt_ompl.ompl_plugin import native_layout, native_space, self_check
+    from cbrrt_ompl.ompl_plugin import native_layout, native_space, rounds, self_check
     from cbrrt_ompl.ompl_plugin.binding import ob, oc
     from cbrrt_ompl.ompl_plugin.compiled_methods import VARIABLE, compiled_methods_work, use_compiled_methods
     from cbrrt_ompl.ompl_plugin.native_layout import LayoutError, object_address, vtable_address, words_at
@@ -180,9 +180,12 @@ def test_the_checker_follows_the_bounds_of_the_space() -> None:
 @pytest.fixture
 def unchecked() -> Iterator[None]:
     """Has the check made anew, before and after the test."""
-    compiled_methods_work.cache_clear()
+    known = (compiled_methods_work, native_layout.vtable_words, native_layout.symbol_address)
+    for function in known:
+        function.cache_clear()
     yield
-    compiled_methods_work.cache_clear()
+    for function in known:
+        function.cache_clear()
 
 
 def hide(name: str) -> Callable[[str], int]:
@@ -206,6 +209,7 @@ FAKES: dict[str, tuple[Any, str, Any, str]] = {
     "other controls": (self_check, "control_at", lambda *_: (0.0,) * 3, "controls are laid out in another way"),
     "other bounds": (self_check, "reals_of_bounds", lambda _: [[0.0], [0.0]], "bounds are elsewhere"),
     "other results": (self_check, "read_state", lambda _: object(), "propagate"),
+    "another condition": (rounds, "PERIOD", -2.0, "a termination condition is laid out in another way"),
     "other weights": (native_space, "_reals", lambda *_: [0.0] * 3, "0 "),
 }
 
@@ -271,6 +275,53 @@ def test_an_object_with_another_vtable_is_left_alone() -> None:
 def test_what_is_no_object_of_a_class_has_no_address_as_such() -> None:
     with pytest.raises(LayoutError, match=r"no ompl::base::State in a"):
         object_address(oc.SimpleSetup, "ompl::base::State")
+
+
+# rounds of a main loop
+
+
+@pytest.mark.parametrize("on", [False, True], ids=["Python", "compiled"])
+@pytest.mark.parametrize("planner", ["cb-rrt", "rrt", "est"])
+def test_a_plan_takes_exactly_the_rounds_that_it_may(planner: str, on: bool, switch: Callable[[bool], None]) -> None:
+    switch(on)
+    walled = replace(EASY, world=World(WORLD.bounds, [Box((4.8, 0.0), (5.0, 10.0))]))
+    result = plan(replace(walled, planning=PlanningSettings(max_samples=777)), planner, seed=1, time_limit=60.0)
+    assert (result.status, result.samples) == ("sample limit", 777)
+
+
+@pytest.mark.parametrize("on", [False, True], ids=["Python", "compiled"])
+def test_an_exception_of_a_look_comes_out_and_the_condition_is_as_it_was(
+    on: bool, switch: Callable[[bool], None]
+) -> None:
+    switch(on)
+
+    def fail(count: int) -> bool:
+        raise LookupError(f"at {count}")
+
+    counted = rounds.Rounds(100, fail)
+    with pytest.raises(LookupError, match="at 0"), counted.condition() as condition:
+        make_setup(EASY, "rrt").solve(condition)
+    with pytest.raises(LookupError, match="at 0"):
+        condition.eval()
+    assert counted.count == 0
+
+
+def test_looks_are_rare_where_rounds_are_short() -> None:
+    looks: list[int] = []
+
+    def look(count: int) -> bool:
+        looks.append(count)
+        return False
+
+    counted = rounds.Rounds(100_000, look)
+    with counted.condition() as condition:
+        while not condition.eval():
+            pass
+    assert counted.count == 100_000
+    assert looks[0] == 0
+    assert len(looks) == len(set(looks))
+    if use_compiled_methods():
+        assert len(looks) < 50_000
 
 
 # exceptions, signals, threads, processes

@@ -34,6 +34,7 @@ def _libraries() -> tuple[ctypes.CDLL, ...]:
     return ctypes.CDLL(ob._base.__file__), ctypes.CDLL(oc._control.__file__)
 
 
+@cache
 def symbol_address(name: str) -> int:
     """Address of an exported symbol.
 
@@ -102,6 +103,7 @@ _SYMBOL_ENTRY = 1
 """``RTLD_DL_SYMENT`` of <dlfcn.h>: ask for the ELF symbol, whose size is its third word."""
 
 
+@cache
 def vtable_words(class_name: str) -> NDArray[np.uint64]:
     """A class's vtable with the `BEFORE_SLOTS` words before its slots, as long as its symbol says: a view, not to be
     written.

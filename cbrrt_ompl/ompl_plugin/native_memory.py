@@ -92,6 +92,12 @@ def call_is_valid(_: Any, method: Any, this: Any, state: Any) -> Any:
 
 
 @_intrinsic
+def call_condition(_: Any, invoker: Any, held: Any) -> Any:
+    """Call what calls a ``std::function<bool()>`` that is held at an address."""
+    return types.uint8(types.int64, types.int64), _call_of(ir.IntType(8), 1)
+
+
+@_intrinsic
 def call_distance(_: Any, method: Any, this: Any, state: Any, other: Any) -> Any:
     """Call a ``double (const State *, const State *) const`` at an address."""
     return types.float64(*[types.int64] * 4), _call_of(_REAL, 3)

@@ -61,6 +61,7 @@ class OwnSampler:
 
     sampler: Any = None
     looks_around = True
+    _prepared: Any = None
     _allocate_by: Callable[[Any], Any] | None = None
     _is_in_place = False  # OMPL's solve with a time calls the solve with a condition
 
@@ -74,18 +75,27 @@ class OwnSampler:
         with self._own_sampler():
             super().setup()  # type: ignore[misc]  # OMPL's
 
+    def prepare(self) -> None:
+        """Make the sampler of the next tree, which ``solve`` would take the time for."""
+        if self.sampler is None and self._prepared is None:
+            self._prepared = self.allocate(self.getSpaceInformation())  # type: ignore[attr-defined]  # OMPL's
+
     def solve(self, *condition: Any) -> Any:
         """Solve; the other planners allocate their sampler here, the first time after ``clear``."""
-        look_again = getattr(self.sampler, "look_again", None)
-        if look_again is not None:  # one of ours, which goes by the parts that it has seen
-            look_again()
+        self.tell(self.sampler or self._prepared)
         with self._own_sampler():
             return super().solve(*condition)  # type: ignore[misc]  # OMPL's
+
+    def tell(self, sampler: Any) -> None:
+        """Have a sampler look at the parts that are there now, if it is one of ours: they go by what they have seen."""
+        look_again = getattr(sampler, "look_again", None)
+        if look_again is not None:
+            look_again()
 
     def clear(self) -> None:
         """Forget tree and sampler."""
         super().clear()  # type: ignore[misc]  # OMPL's
-        self.sampler = None
+        self.sampler = self._prepared = None
 
     def clearQuery(self) -> None:  # noqa: N802  # OMPL's name
         """Forget tree and sampler: what OMPL's method says that it does, which calls itself without end instead."""
@@ -110,7 +120,7 @@ class OwnSampler:
                 si.setup()
 
     def _allocate(self, si: Any) -> Any:
-        made = self.allocate(si)
+        made, self._prepared = self._prepared or self.allocate(si), None
         if not isinstance(made, oc.DirectedControlSampler):  # OMPL would crash on None
             raise SettingsError(Problem("directed sampler", made, "an ompl.control.DirectedControlSampler"))
         self.sampler = made

@@ -59,6 +59,7 @@ class PaperPlanner(OwnSampler, oc.RRT):  # type: ignore[misc]  # OMPL has no typ
         warm_up()
         self._check()
         super().setup()
+        self.prepare()
 
     def solve(self, *condition: Any) -> Any:
         """Grow the tree, with the parts and towards the goal that are there now."""
@@ -69,11 +70,14 @@ class PaperPlanner(OwnSampler, oc.RRT):  # type: ignore[misc]  # OMPL has no typ
         if self._query is not None and not self._query.is_continued_by(query):
             self.clear()
         self._query, self._goal = query, problem.getGoal()
-        if self.sampler is not None:
-            self.sampler.aim_at(self._goal)
         status = super().solve(*condition)
         raise_errors()
         return status
+
+    def tell(self, sampler: Any) -> None:
+        """Have a sampler look at the parts and at the goal that are there now."""
+        if sampler is not None:
+            sampler.aim_at(self._goal)
 
     def _check(self) -> None:
         """Refuse what this planner cannot take."""

@@ -13,6 +13,7 @@ from cbrrt_ompl.ompl_plugin.binding import ob, ou
 from cbrrt_ompl.ompl_plugin.compiled_methods import use_compiled_methods
 from cbrrt_ompl.ompl_plugin.paper_planner import PaperPlanner
 from cbrrt_ompl.ompl_plugin.results import trajectory_from_path, tree_from_planner
+from cbrrt_ompl.ompl_plugin.rounds import Rounds
 from cbrrt_ompl.ompl_plugin.setup import make_setup
 from cbrrt_ompl.planners.first_plan import FirstPlan
 from cbrrt_ompl.scenario.scenario import Scenario
@@ -36,7 +37,7 @@ def run(
         planner: a name that :func:`cbrrt_ompl.ompl_plugin.setup.make_setup` knows.
         seed: 0 or more, or None for a fresh one.
         on_start: called when the search begins.
-        should_stop: called once a round of the planner's main loop, with the rounds so far.
+        should_stop: called about every millisecond, with the rounds of the planner's main loop so far.
         prepare: takes the ``SimpleSetup`` before it is set up, to change it.
     """
     use_compiled_methods()  # their check compiles, and no seed may depend on it
@@ -51,12 +52,12 @@ def run(
         if isinstance(solver, PaperPlanner):
             solver.looks_around = False
         setup.setup()
-        rounds = _Rounds(scenario.planning.filled().max_samples, should_stop)
-        condition = ob.PlannerTerminationCondition(ob.PlannerTerminationConditionFn(rounds))
-        on_start()
-        began = time.perf_counter()
-        setup.solve(condition)
-        planning_time = time.perf_counter() - began
+        rounds = Rounds(scenario.planning.filled().max_samples, should_stop)
+        with rounds.condition() as condition:
+            on_start()
+            began = time.perf_counter()
+            setup.solve(condition)
+            planning_time = time.perf_counter() - began
         trajectory = None
         if setup.haveExactSolutionPath():
             trajectory = trajectory_from_path(setup.getSolutionPath(), scenario)
@@ -74,21 +75,6 @@ def count_nodes(planner: Any, si: Any) -> int:
     data = ob.PlannerData(si)
     planner.getPlannerData(data)
     return int(data.numVertices())
-
-
-class _Rounds:
-    """OMPL's termination condition: counts the rounds of the main loop."""
-
-    def __init__(self, limit: int, should_stop: Callable[[int], bool]) -> None:
-        self.count = 0
-        self._limit = limit
-        self._should_stop = should_stop
-
-    def __call__(self) -> bool:
-        if self.count >= self._limit or self._should_stop(self.count):
-            return True
-        self.count += 1
-        return False
 
 
 @contextmanager

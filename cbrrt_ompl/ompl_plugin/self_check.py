@@ -42,6 +42,7 @@ from cbrrt_ompl.ompl_plugin.native_space import (
     reals_of_bounds,
 )
 from cbrrt_ompl.ompl_plugin.propagators import TwoWheelPropagator
+from cbrrt_ompl.ompl_plugin.rounds import Rounds
 from cbrrt_ompl.ompl_plugin.samplers import KanayamaDirectedControlSampler
 from cbrrt_ompl.ompl_plugin.space import bounds_of, make_control_space, make_state_space, read_state, write_state
 from cbrrt_ompl.ompl_plugin.validity import FclStateValidityChecker
@@ -74,6 +75,7 @@ def check_compiled_methods() -> None:
     check_vtables()
     check_reading()
     check_results()
+    check_condition()
 
 
 def check_vtables() -> None:
@@ -127,6 +129,21 @@ def check_results() -> None:
     for (name, expected), (_, compiled) in zip(*found, strict=True):
         if expected != compiled:
             raise LayoutError(f"{name}: {compiled} instead of {expected}")
+
+
+def check_condition() -> None:
+    """Rounds are counted, and Python is asked in between."""
+    asked: list[int] = []
+
+    def look(count: int) -> bool:
+        asked.append(count)
+        return False
+
+    rounds = Rounds(10, look)
+    with rounds.condition() as condition:
+        ended = [condition.eval() for _ in range(12)]
+    if (ended, rounds.count, asked[:1]) != ([False] * 10 + [True] * 2, 10, [0]):
+        raise LayoutError("rounds are not counted")
 
 
 def _results(is_compiled: bool) -> list[tuple[str, Any]]:
