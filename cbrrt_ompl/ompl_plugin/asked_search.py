@@ -12,7 +12,7 @@ from cbrrt_ompl.ompl_plugin.binding import ob
 from cbrrt_ompl.ompl_plugin.extender import Extender
 from cbrrt_ompl.ompl_plugin.space import bounds_of, read_state, write_state
 from cbrrt_ompl.planners.extension import EXTENDED, NO_CHILD, REFUSED, UNTRIED
-from cbrrt_ompl.planners.growth import add_node, one_of_twins, tolerated_failures
+from cbrrt_ompl.planners.growth import add_node, one_of_twins, shortened, tolerated_failures
 from cbrrt_ompl.planners.nearest import nearest
 from cbrrt_ompl.planners.search import Search
 from cbrrt_ompl.problem.settings import State
@@ -67,6 +67,9 @@ class AskedSearch(Search):
         place = max(nearest(self._index, x, y, self.nodes, most_failures), 0)
         parent = one_of_twins(self._tree, place, draw[3])
         node, state = self._tree[parent], self._state_of(parent)
+        if self._search["is_robust"][0]:
+            failures = int(self._index.places["failures"][place])
+            x, y = shortened((x, y), state.x, state.y, failures, self.model["look_ahead"][0])
         first_child = int(node["first_child"])
         write_state(self._source, state)
         outcome = self._extender.extend(self._source(), np.array(state), x, y, first_child, self._tree)
