@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from numbers import Integral
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from cbrrt_ompl.optimise.improving import Found, Improver, check_improvement, ge
 from cbrrt_ompl.optimise.improving import warm_up as warm_up_improvement
 from cbrrt_ompl.optimise.interior_point import iterate
 from cbrrt_ompl.optimise.objective import Objective
+from cbrrt_ompl.planners.bounded import BoundedTrees
 from cbrrt_ompl.planners.first_plan import FirstPlan
 from cbrrt_ompl.planners.registry import PLANNERS, is_compiled, law_of, planner_named, scenario_for
 from cbrrt_ompl.planners.search import search_in
@@ -134,8 +135,9 @@ def plan(
         improve_for: time to improve the first trajectory for, from when it is found [s]; see
             :func:`cbrrt_ompl.improve`. None improves nothing, unless ``max_iterations`` is given.
         max_iterations: Newton steps to improve it for: the result is then the same on every run, unless the time ends
-            it. ``cb-rrt-anytime`` ends by them where ``improve_for`` is not given.
-        objective: what to improve; the duration if not given.
+            it. ``cb-rrt-anytime`` ends by them where ``improve_for`` is not given. ``cb-rrt-ao`` improves by samples,
+            and this is their number; where neither is given, it ends by ``max_samples`` or ``time_limit``.
+        objective: what to improve; the duration if not given, and the only one that ``cb-rrt-ao`` takes.
         callback: called with each trajectory's time, duration and source, as they are found.
         should_stop: asked every few milliseconds whether to end the improvement with the best so far.
 
@@ -146,18 +148,20 @@ def plan(
         ScenarioError: if this is no scenario.
         UnknownPlannerError: if there is no such planner.
         OmplMissingError: if the planner needs OMPL, and there is none; the planners of this package's own do not.
-        SettingsError: if the seed, the time limit or the step make no sense.
+        SettingsError: if the seed, the time limit, the step or what is said of the improvement make no sense.
         KeyboardInterrupt: on Ctrl-C, at once.
     """
     check_scenario(scenario)
     asked = scenario
-    is_anytime = planner_named(planner).is_anytime
+    row = planner_named(planner)
     scenario = scenario_for(planner, scenario)
     _check_arguments(seed, time_limit, progress)
     check_improvement(improve_for, max_iterations, objective, callback, should_stop, name="improve_for")
+    if row.is_bounded and objective not in (None, Objective()):
+        raise SettingsError(Problem("objective", objective, f"None for {planner}, whose cost is the duration"))
     check_step(scenario.robot, scenario.planning)
     warm_up_planner(planner)
-    improves = is_anytime or improve_for is not None or max_iterations is not None
+    improves = not row.is_bounded and (row.is_anytime or improve_for is not None or max_iterations is not None)
     if improves:
         warm_up_improvement()
     if not scenario.goal.violations(scenario.start):
@@ -166,9 +170,12 @@ def plan(
         scenario = replace(scenario, goal=approachable_goal(scenario))
     is_hopeless = partial(has_no_way, scenario.world, scenario.robot.footprint, scenario.start, scenario.goal)
     watch = _Watch(time_limit, progress, is_hopeless)
+    if row.is_bounded:
+        limits = _Limits(improve_for, max_iterations, should_stop)
+        return replace(_plan_bounded(scenario, planner, seed, watch, limits, callback), scenario=asked)
     if not improves:
         return replace(_first_plan(scenario, planner, seed, watch), scenario=asked)
-    if is_anytime and improve_for is None and max_iterations is None:
+    if row.is_anytime and improve_for is None and max_iterations is None:
         max_iterations = ANYTIME_ITERATIONS
     improver = Improver(
         scenario,
@@ -180,7 +187,7 @@ def plan(
         is_kinematic=jumps(law_of(planner, scenario.planning), scenario.robot),
     )
     budget = math.inf if improve_for is None else improve_for
-    if is_anytime:
+    if row.is_anytime:
         return replace(_plan_anytime(scenario, planner, seed, watch, improver, budget), scenario=asked)
     result = _first_plan(scenario, planner, seed, watch)
     if result.trajectory is not None:
@@ -229,6 +236,55 @@ def _plan_anytime(
     return _with_best(result, improver)
 
 
+class _Limits(NamedTuple):
+    """How long to go on after the first plan."""
+
+    improve_for: float | None
+    max_iterations: int | None
+    should_stop: Callable[[], bool] | None
+
+
+def _plan_bounded(
+    scenario: Scenario,
+    planner: str,
+    seed: int | None,
+    watch: _Watch,
+    limits: _Limits,
+    callback: Callable[[Found], None] | None,
+) -> PlanResult:
+    """The first plan, and then those of trees that are bounded by the best."""
+    row, most = PLANNERS[planner], scenario.planning.filled().max_samples
+    first_seed = int(np.random.default_rng().integers(2**31)) if seed is None else seed
+    search = search_in(scenario, row.law(scenario.planning), first_seed, robust=row.is_robust)
+    watch.start()
+    search.run(watch.should_stop, most)
+    if not search.has_reached_goal:
+        return _result_of(search.first_plan(watch.elapsed()), planner, seed, watch.ended_by)
+    history = list[Found]()
+
+    def note(source: str) -> None:
+        dt = float(search.model["dt"][0])
+        history.append(Found(watch.elapsed(), dt * int(trees.best.total_steps[-1]), source))
+        if callback is not None:
+            callback(history[-1])
+
+    def should_stop(samples: int) -> bool:
+        return watch.should_stop(samples) or (limits.should_stop is not None and bool(limits.should_stop()))
+
+    trees = BoundedTrees(search, first_seed)
+    note(planner)
+    if limits.improve_for is not None:
+        watch.go_on(limits.improve_for)
+    if limits.max_iterations is not None:
+        most_samples: float = search.samples + limits.max_iterations
+    else:
+        most_samples = most if limits.improve_for is None else math.inf
+    while trees.find_quicker(should_stop, most_samples):
+        note(f"tree {trees.trees}")
+    found = trees.best.first_plan(watch.elapsed())._replace(samples=trees.samples)
+    return replace(_result_of(found, planner, seed, SOLVED), history=tuple(history))
+
+
 def _with_best(result: PlanResult, improver: Improver) -> PlanResult:
     """A result with the best trajectory of an improver, if it has one."""
     if improver.best is None:
@@ -251,7 +307,7 @@ def warm_up_planner(planner: str) -> None:
     """
     if not is_compiled(planner):
         check_ompl(f"planner {planner!r}", "s-rrt-compiled" if planner == "s-rrt" else "cb-rrt-compiled")
-    if planner_named(planner).is_anytime:
+    if planner_named(planner).optimises:
         with compiled_beside("cbrrt_ompl.optimise.improving", "warm_up", iterate):
             warm_up()
         warm_up_improvement()
@@ -352,6 +408,10 @@ class _Watch:
         self.began = time.perf_counter()
         self._next_report = self.began + PROGRESS_PERIOD
         self._doubts_at = self.began + PATIENCE if self._time_limit >= 2.0 * PATIENCE else math.inf
+
+    def go_on(self, seconds: float) -> None:
+        """End so much later than now [s]; there is a way."""
+        self._time_limit, self._doubts_at = self.elapsed() + seconds, math.inf
 
     def left(self) -> float:
         """Time that is left [s]."""

@@ -48,7 +48,7 @@ def planned(scenario: Scenario = SCENARIO, planner: str = ANYTIME, **arguments: 
 @pytest.mark.parametrize("planner", [name for name in PLANNERS if not name.startswith("syclop")])
 def test_every_planner_improves_its_plan_on_request(planner: str) -> None:
     scenario = replace(SCENARIO, world=World(TWO_WAYS.bounds), goal=Goal(3.0, 2.0, tolerance=0.5))
-    plain = PlanResult if planner == ANYTIME else plan(scenario, planner, seed=1, time_limit=20.0)
+    plain = PlanResult if PLANNERS[planner].is_anytime else plan(scenario, planner, seed=1, time_limit=20.0)
     result = planned(scenario, planner, max_iterations=200)
     assert result.trajectory is not None
     assert verify(result.trajectory, scenario).violations == ()

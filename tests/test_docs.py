@@ -96,7 +96,7 @@ def test_the_scenario_page_has_the_defaults_of_the_planners_for_maps(docs: Path)
     section = page.partition("\n## planning\n")[2]
     found = re.findall(r"^\| `(\w+)`[^|]*\|[^|]*\| (?:`([^|]*)`|the same) \|", section, flags=re.MULTILINE)
     usual, stated = vars(PlanningSettings().filled()), {name: yaml.safe_load(own) for name, own in found if own}
-    for row in (PLANNERS["cb-rrt-robust"], PLANNERS["cb-rrt-anytime"]):
+    for row in (PLANNERS["cb-rrt-robust"], PLANNERS["cb-rrt-anytime"], PLANNERS["cb-rrt-ao"]):
         own = vars(row.settings(PlanningSettings()))
         assert stated == {name: value for name, value in own.items() if value != usual[name]}
 

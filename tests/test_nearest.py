@@ -49,9 +49,9 @@ class Nodes:
             self.count += 1
         self.index = with_room_for_a_search(self.index)
 
-    def nearest(self, x: float, y: float, most_failures: float = math.inf) -> int:
+    def nearest(self, x: float, y: float, most_failures: float = math.inf, most_steps: float = math.inf) -> int:
         """The node found."""
-        return int(nearest(self.index, x, y, self.count, most_failures))
+        return int(nearest(self.index, x, y, self.count, most_failures, most_steps))
 
     def distance(self, x: float, y: float) -> float:
         """Squared distance of the node found."""
@@ -203,6 +203,19 @@ def test_the_nearest_node_within_the_limit_of_failures_is_found(kind: int) -> No
         distances = np.where(failures <= limit, np.hypot(*(positions - (x, y)).T), np.inf)
         expected = int(distances.argmin()) if np.isfinite(distances).any() else -1
         assert nodes.nearest(x, y, limit) == expected
+
+
+@KINDS
+def test_the_nearest_node_within_so_many_steps_from_the_root_is_found(kind: int) -> None:
+    rng = np.random.default_rng(2)
+    positions, steps = rng.uniform(-5.0, 5.0, (60, 2)), rng.integers(0, 400, 60)
+    nodes = Nodes(kind, WORLD, 60)
+    nodes.enter(positions)
+    nodes.index.places["steps"] = steps
+    for x, y, limit in rng.uniform((-5.0, -5.0, -20.0), (5.0, 5.0, 400.0), (200, 3)).tolist():
+        distances = np.where(steps <= limit, np.hypot(*(positions - (x, y)).T), np.inf)
+        expected = int(distances.argmin()) if np.isfinite(distances).any() else -1
+        assert nodes.nearest(x, y, most_steps=limit) == expected
 
 
 @KINDS

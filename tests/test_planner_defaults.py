@@ -32,7 +32,7 @@ from cbrrt_ompl.motion.model import CLOSED_LOOP, OPEN_LOOP
 from cbrrt_ompl.planners.registry import PLANNERS, law_of, scenario_for
 from cbrrt_ompl.problem.robot import gains_for
 
-FOR_MAPS = ("cb-rrt-robust", "cb-rrt-anytime")
+FOR_MAPS = ("cb-rrt-robust", "cb-rrt-anytime", "cb-rrt-ao")
 
 
 @pytest.fixture

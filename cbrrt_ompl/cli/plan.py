@@ -43,7 +43,7 @@ def add_parser(commands: Commands) -> None:
     add_planner(parser, None, f"cb-rrt; in a map {MAP_PLANNERS[0]}")
     add_seed(parser)
     add_time_limit(parser, "planning time")
-    text = "then improve the trajectory by optimal control, for this long at most [s]"
+    text = "then improve the trajectory by optimal control (cb-rrt-ao: sampling), for this long at most [s]"
     parser.add_argument("--improve-for", type=seconds, metavar="S", help=text)
     add_iterations(parser)
     add_output_files(parser, FILES)
@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     planner = arguments.planner or (map_planner() if is_map(arguments.scenario) else "cb-rrt")
     limits = {"improve_for": arguments.improve_for, "max_iterations": arguments.max_iterations}
-    improves = any(limit is not None for limit in limits.values())
+    improves = not planner_named(planner).is_bounded and any(limit is not None for limit in limits.values())
     with keeping_inputs(arguments, FILES):
         scenario = given_scenario(arguments, lambda: warm_up(planner, improves))
     with plan_progress(planner_named(planner).settings(scenario.planning).max_samples, planner) as progress:

@@ -69,7 +69,7 @@ def _tell_of_compilation(planner: str | None, improves: bool) -> None:
     loops = 0 if planner is None else LOOPS_OF_PLANNERS
     if planner is not None and not is_compiled(planner):
         loops += LOOPS_OF_PLUGIN
-    if improves or (planner is not None and PLANNERS[planner].is_anytime):
+    if improves or (planner is not None and PLANNERS[planner].optimises):
         loops += LOOPS_OF_IMPROVEMENT
     share = SHARE_OF_TWO_CORES if available_cores() > 1 else 1.0
     seconds = share * loops * min(timeit.repeat("sum(i * i for i in range(100_000))", number=1, repeat=10))

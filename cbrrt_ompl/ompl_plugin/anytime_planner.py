@@ -1,7 +1,8 @@
-"""cb-rrt-anytime as a planner of OMPL: plan after plan, and the best of them by an objective of OMPL's."""
+"""cb-rrt-anytime and cb-rrt-ao as planners of OMPL: plan after plan, and the best of them by an objective of OMPL's."""
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -9,6 +10,8 @@ from typing import Any, NamedTuple
 from cbrrt_ompl.ompl_plugin.binding import ob
 from cbrrt_ompl.ompl_plugin.compiled_planner import CompiledPlanner
 from cbrrt_ompl.ompl_plugin.duration_objective import DurationObjective
+from cbrrt_ompl.planners.bounded import TREE_SAMPLES
+from cbrrt_ompl.planners.registry import planner_named
 
 
 class Progress(NamedTuple):
@@ -26,6 +29,8 @@ class AnytimePlanner(CompiledPlanner):
     The objective of the problem definition decides which solution is better, and ends the search where its cost
     threshold is met; without one the duration does. Each better solution goes to the problem definition's callback for
     intermediate solutions, the best one into the problem definition. Its tree is the one that is kept.
+
+    Where the planner is bounded and the objective is the duration, a tree keeps only what may be quicker than the best.
 
     Attributes:
         progress: the solutions of the last ``solve``, each better than the one before.
@@ -52,12 +57,14 @@ class AnytimePlanner(CompiledPlanner):
         objective = (
             problem.getOptimizationObjective() if has_objective else DurationObjective(self.getSpaceInformation())
         )
+        is_bounded = planner_named(self._kind).is_bounded and isinstance(objective, DurationObjective)
+        assert self.search is not None
         best, best_path = self.search, self._path()
         best_cost = self._report(problem, objective, best_path)
         while not objective.isSatisfied(best_cost) and not should_stop():
             self._next_seed()
-            self.search = self._new_search(self._starts)
-            self.search.run(lambda _: bool(should_stop()), self._max_samples)
+            self.search = self._new_search(self._starts, int(best.total_steps[-1]) - 1 if is_bounded else math.inf)
+            self.search.run(lambda _: bool(should_stop()), TREE_SAMPLES if is_bounded else self._max_samples)
             if not self.search.has_reached_goal:
                 continue
             path = self._path()

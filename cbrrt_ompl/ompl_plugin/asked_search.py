@@ -64,7 +64,7 @@ class AskedSearch(Search):
         """Extend the node nearest to a sample."""
         x, y = self._sample(draw)
         most_failures = tolerated_failures(draw[4]) if self._search["is_robust"][0] else math.inf
-        place = max(nearest(self._index, x, y, self.nodes, most_failures), 0)
+        place = max(nearest(self._index, x, y, self.nodes, most_failures, math.inf), 0)
         parent = one_of_twins(self._tree, place, draw[3])
         node, state = self._tree[parent], self._state_of(parent)
         if self._search["is_robust"][0]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -51,7 +52,7 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
         Args:
             si: the space information of the problem.
             scenario: robot, world and settings.
-            name: `cb-rrt-compiled`, `cb-rrt-robust` or `s-rrt-compiled`.
+            name: of a compiled planner.
             seed: of the first tree; the next ones go on from there. None takes one of those that OMPL deals out.
         """
         super().__init__(si, name)
@@ -144,8 +145,14 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
         starts = (problem.getStartState(i) for i in range(problem.getStartStateCount()))
         return [read_state(start) for start in starts if si.satisfiesBounds(start) and si.isValid(start)]
 
-    def _new_search(self, starts: list[State]) -> Search:
-        """A search from valid starts: compiled, or with OMPL's parts asked where they are a user's."""
+    def _new_search(self, starts: list[State], most_steps: float = math.inf) -> Search:
+        """A search from valid starts: compiled, or with OMPL's parts asked where they are a user's.
+
+        Args:
+            starts: at least one.
+            most_steps: of a way into the goal, which bounds the compiled search alone: how fast a user's propagator is
+                and where a user's goal is, nobody knows.
+        """
         si, scenario = self.getSpaceInformation(), self._scenario
         extender = Extender(
             si,
@@ -163,7 +170,9 @@ class CompiledPlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no type inf
         if extender.is_compiled:
             neighbours = scenario.planning.nearest_neighbour
             world, footprint = scenario.world, scenario.robot.footprint
-            return Search(extender.model, world, footprint, starts, neighbours=neighbours, **settings)
+            search = Search(extender.model, world, footprint, starts, neighbours=neighbours, **settings)
+            search.bound(most_steps)
+            return search
         return AskedSearch(extender, si, self._goal[0], scenario, starts, **settings)
 
     def _ends_in(self, goal: Any) -> bool:

@@ -2,7 +2,7 @@
 
 The robust kind departs from the paper in two lines: what is extended is the nearest place that is not passed over; and
 the more extensions from a place have failed, the likelier it is passed over, and the shorter is the next one's way
-(docs/robust.md).
+(docs/robust.md). A bounded search keeps only what may be in the goal within so many steps (docs/improve.md).
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from cbrrt_ompl.collision.scene import Scene
 from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.motion.manoeuvres import is_manoeuvre
 from cbrrt_ompl.motion.model import in_goal
-from cbrrt_ompl.motion.records import Records
-from cbrrt_ompl.planners.extension import EXTENDED, NO_CHILD, REFUSED, UNTRIED, extend
+from cbrrt_ompl.motion.records import Record, Records
+from cbrrt_ompl.planners.extension import EXTENDED, NO_CHILD, REFUSED, UNTRIED, Extension, extend
 from cbrrt_ompl.planners.nearest import KD_TREE, Index, insert, leave_out, nearest
 from cbrrt_ompl.planners.roll_out import margin_at
 
 GROW_REACHED, GROW_WANTS_ROOM, GROW_WANTS_DRAWS, GROW_PAUSED = 0, 1, 2, 3
 """Why the loop returns: a node in the goal, full arrays, no random numbers left, enough for now."""
 
-DRAWS, ROBUST_DRAWS = 4, 5
+DRAWS, ROBUST_DRAWS, BOUNDED_DRAWS = 4, 5, 6
 """Random numbers of a sample: goal bias, x, y, the choice among nodes at one position; and how many failures of a place
-are tolerated."""
+are tolerated. Those of a bounded search have a sixth, after how many steps a node may be extended."""
 
 LEAST_SHARE = 0.125
 """Share of the way to its reference that an extension keeps, however many from its place have failed."""
@@ -48,6 +48,7 @@ NODE = np.dtype(
         ("sibling", np.int32),  # next older child of the same parent, -1 at the end
         ("twin", np.int32),  # next node at exactly the same position, -1 at the end
         ("place", np.int32),  # the indexed node at the same position, first of the chain of twins
+        ("total_steps", np.int32),  # of the way from the root
         ("any_heading", np.bool_),  # of the margin
     ],
     align=True,
@@ -58,6 +59,7 @@ SEARCH = np.dtype(
     [
         ("goal_bias", np.float64),  # fraction of samples that are the goal
         ("is_robust", np.bool_),
+        ("most_steps", np.float64),  # of a way into the goal that is better than what is known; infinite at first
         ("nodes", np.int64),
         ("samples", np.int64),
         ("drawn", np.int64),  # rows of random numbers used up
@@ -78,6 +80,7 @@ def add_node(tree: Records, index: Index, number: int, parent: int) -> None:
     node = tree[number]
     node.parent, node.first_child, node.sibling, node.twin, node.place = parent, UNTRIED, -1, -1, number
     node.margin, node.any_heading = -1.0, False
+    node.total_steps = tree[parent].total_steps + node.steps if parent >= 0 else 0
     if parent >= 0:
         node.sibling = tree[parent].first_child
         tree[parent].first_child = number
@@ -91,6 +94,7 @@ def add_node(tree: Records, index: Index, number: int, parent: int) -> None:
             leave_out(index, number)
             return
     insert(index, number, node.x, node.y)
+    index.places[number].steps = node.total_steps
 
 
 @kernel
@@ -145,6 +149,44 @@ def shortened(sample: tuple[float, float], x: float, y: float, failures: int, lo
 
 
 @kernel
+def steps_left(x: float, y: float, model: Record) -> float:
+    """Lower bound of the integration steps from a position into the goal region: straight, at the highest speed."""
+    goal, limits = model.goal, model.limits
+    distance = math.hypot(x - goal.x, y - goal.y) - goal.tolerance
+    return max(distance, 0.0) / (max(limits.v_max, -limits.v_min) * model.dt)
+
+
+@kernel
+def drawn_steps(draw: float, sample: tuple[float, float], most_steps: float, model: Record) -> float:
+    """Most steps after which a node may be extended towards a sample: the cost of the sample in the state-cost space.
+
+    Args:
+        draw: random number in [0, 1).
+        sample: (x, y) [m].
+        most_steps: of a way into the goal.
+        model: a record of type :data:`cbrrt_ompl.motion.model.MODEL`.
+
+    Returns:
+        Uniform in what is left of ``most_steps`` at the sample; 0, which only roots have, where nothing is.
+    """
+    return draw * max(most_steps - steps_left(sample[0], sample[1], model), 0.0)
+
+
+@kernel
+def is_over_bound(total_steps: int, extension: Extension, most_steps: float, model: Record) -> bool:
+    """Whether no way through an extension's end can be in the goal within some steps.
+
+    Args:
+        total_steps: of the way from the root to the extended node.
+        extension: from that node.
+        most_steps: of a way into the goal.
+        model: a record of type :data:`cbrrt_ompl.motion.model.MODEL`.
+    """
+    left = steps_left(extension.state[0], extension.state[1], model)
+    return total_steps + extension.steps + left > most_steps
+
+
+@kernel
 def grow(
     tree: Records,
     index: Index,
@@ -161,7 +203,7 @@ def grow(
         tree: records of type `NODE`.
         index: of the tree's places.
         searches: one record of type `SEARCH`, which counts on.
-        draws: random numbers in [0, 1), a sample a row, shape (m, DRAWS), or (m, ROBUST_DRAWS).
+        draws: random numbers in [0, 1), a sample a row, shape (m, DRAWS), (m, ROBUST_DRAWS) or (m, BOUNDED_DRAWS).
         last_sample: number of samples to pause at.
         scene: world and footprint.
         models: one record of type :data:`cbrrt_ompl.motion.model.MODEL`.
@@ -182,7 +224,10 @@ def grow(
         if draw[0] < search.goal_bias:
             sample = (model.goal.x, model.goal.y)
         most_failures = tolerated_failures(draw[4]) if search.is_robust else math.inf
-        place = max(nearest(index, sample[0], sample[1], search.nodes, most_failures), 0)  # the root if all failed
+        is_bounded = search.most_steps < math.inf
+        latest = drawn_steps(draw[5], sample, search.most_steps, model) if is_bounded else math.inf
+        # the root if all failed
+        place = max(nearest(index, sample[0], sample[1], search.nodes, most_failures, latest), 0)
         parent = one_of_twins(tree, place, draw[3])
         node = tree[parent]
         if node.margin < 0.0:
@@ -195,7 +240,8 @@ def grow(
             node.first_child = NO_CHILD
         search.drawn += 1
         search.samples += 1
-        if extension.outcome == EXTENDED:
+        is_late = is_bounded and is_over_bound(node.total_steps, extension, search.most_steps, model)
+        if extension.outcome == EXTENDED and not is_late:
             number = search.nodes
             new = tree[number]
             new.x, new.y, new.theta, new.v, new.omega = extension.state

@@ -32,7 +32,7 @@ PLACE = np.dtype(
         ("left", np.int32),  # grid: next place of the cell; k-d tree: left child; -1 at the end
         ("right", np.int32),  # k-d tree: right child
         ("failures", np.int32),  # extensions from here that have failed
-        ("unused", np.int32),
+        ("steps", np.int32),  # of the way from the root to here
     ],
     align=True,
 )
@@ -141,7 +141,7 @@ def _enter_again(index: Index, nodes: int) -> None:
 def insert(index: Index, node: int, x: float, y: float) -> None:
     """Add a place."""
     place = index.places[node]
-    place.x, place.y, place.left, place.right, place.failures = x, y, -1, -1, 0
+    place.x, place.y, place.left, place.right, place.failures, place.steps = x, y, -1, -1, 0, 0
     if index.kind == GRID:
         _insert_into_grid(index, node)
     elif index.kind == KD_TREE:
@@ -198,7 +198,7 @@ def _insert_into_kd_tree(index: Index, node: int) -> None:
 
 
 @kernel
-def nearest(index: Index, x: float, y: float, nodes: int, most_failures: float) -> int:
+def nearest(index: Index, x: float, y: float, nodes: int, most_failures: float, most_steps: float) -> int:
     """The place nearest to a position.
 
     Args:
@@ -207,26 +207,28 @@ def nearest(index: Index, x: float, y: float, nodes: int, most_failures: float) 
         y: position [m].
         nodes: nodes in the tree, for brute force.
         most_failures: places with more failures than this are passed over.
+        most_steps: places more steps away from the root than this are passed over.
 
     Returns:
         Its node, -1 where all are passed over.
     """
     if index.kind == GRID:
-        return _nearest_in_grid(index, x, y, most_failures)
+        return _nearest_in_grid(index, x, y, most_failures, most_steps)
     if index.kind == KD_TREE:
-        return _nearest_in_kd_tree(index, x, y, most_failures)
+        return _nearest_in_kd_tree(index, x, y, most_failures, most_steps)
     best, node = math.inf, -1
     for i in range(nodes):
         place = index.places[i]
         dx, dy = place.x - x, place.y - y
         squared = dx * dx + dy * dy
-        if squared < best and place.failures <= most_failures and place.failures != NOT_INDEXED:
+        is_taken = place.failures <= most_failures and place.steps <= most_steps and place.failures != NOT_INDEXED
+        if squared < best and is_taken:
             best, node = squared, i
     return node
 
 
 @inner_kernel
-def _nearest_in_grid(index: Index, x: float, y: float, most_failures: float) -> int:
+def _nearest_in_grid(index: Index, x: float, y: float, most_failures: float, most_steps: float) -> int:
     """Search the rows of cells outwards, and in each row its occupied cells outwards, as far as they can be nearer."""
     row, column = _cell_of(index, x, y)
     rows = len(index.heads)
@@ -242,7 +244,7 @@ def _nearest_in_grid(index: Index, x: float, y: float, most_failures: float) -> 
             here, above = above, _next_row(index.row_words, above + 1)
         else:
             here, below = below, _last_row(index.row_words, below - 1)
-        best, node = _nearest_in_row(index, x, y, here, column, gap * gap, best, node, most_failures)
+        best, node = _nearest_in_row(index, x, y, here, column, gap * gap, best, node, most_failures, most_steps)
 
 
 @kernel(inline="always")
@@ -278,6 +280,7 @@ def _nearest_in_row(
     best: float,
     node: int,
     most_failures: float,
+    most_steps: float,
 ) -> tuple[float, int]:
     """Search one row of the grid, from a column on to the right and then to the left.
 
@@ -291,9 +294,10 @@ def _nearest_in_row(
         best: squared distance of the nearest place so far [m^2].
         node: the nearest place so far.
         most_failures: see :func:`nearest`.
+        most_steps: see :func:`nearest`.
 
     Returns:
-        The last two numbers but one again.
+        Distance and number of the nearest place again.
     """
     words, all_bits = index.words[row], ~np.uint64(0)
     word, bit = column // WORD, np.uint64(column % WORD)
@@ -308,7 +312,7 @@ def _nearest_in_row(
         gap = index.x_min + c * index.width - x if c > column else 0.0
         is_near = gap * gap + squared_gap < best
         if is_near:
-            best, node = _nearest_in_cell(index, index.heads[row, c], x, y, best, node, most_failures)
+            best, node = _nearest_in_cell(index, index.heads[row, c], x, y, best, node, most_failures, most_steps)
         cells &= cells - np.uint64(1)
     word = column // WORD
     cells = words[word] & ((np.uint64(1) << bit) - np.uint64(1))
@@ -323,28 +327,28 @@ def _nearest_in_row(
         gap = x - index.x_min - (c + 1) * index.width
         is_near = gap * gap + squared_gap < best
         if is_near:
-            best, node = _nearest_in_cell(index, index.heads[row, c], x, y, best, node, most_failures)
+            best, node = _nearest_in_cell(index, index.heads[row, c], x, y, best, node, most_failures, most_steps)
         cells ^= np.uint64(1) << np.uint64(place)
     return best, node
 
 
 @kernel(inline="always")
 def _nearest_in_cell(
-    index: Index, place: int, x: float, y: float, best: float, node: int, most_failures: float
+    index: Index, place: int, x: float, y: float, best: float, node: int, most_failures: float, most_steps: float
 ) -> tuple[float, int]:
     """Search the places of a cell from its first on; see :func:`_nearest_in_row`."""
     while place >= 0:
         here = index.places[place]
         dx, dy = here.x - x, here.y - y
         squared = dx * dx + dy * dy
-        if squared < best and here.failures <= most_failures:
+        if squared < best and here.failures <= most_failures and here.steps <= most_steps:
             best, node = squared, place
         place = here.left
     return best, node
 
 
 @inner_kernel
-def _nearest_in_kd_tree(index: Index, x: float, y: float, most_failures: float) -> int:
+def _nearest_in_kd_tree(index: Index, x: float, y: float, most_failures: float, most_steps: float) -> int:
     """Search depth first, the nearer side first, leaving out what lies beyond the best so far."""
     places, stack = index.places, index.stack
     best, node = math.inf, -1
@@ -359,7 +363,7 @@ def _nearest_in_kd_tree(index: Index, x: float, y: float, most_failures: float) 
             place = places[i]
             dx, dy = place.x - x, place.y - y
             squared = dx * dx + dy * dy
-            if squared < best and place.failures <= most_failures:
+            if squared < best and place.failures <= most_failures and place.steps <= most_steps:
                 best, node = squared, i
             offset = dx if axis == 0 else dy
             near, far = (place.left, place.right) if offset > 0.0 else (place.right, place.left)

@@ -47,12 +47,19 @@ class Planner:
     """Whether places are passed over the likelier, the more extensions from there have failed."""
     is_anytime: bool = False
     """Whether it goes on after its first plan."""
+    is_bounded: bool = False
+    """Whether it goes on by trees that keep only what may be quicker than its best plan, not by optimal control."""
     ompl_class: str = "RRT"
     """Name of its class in ``ompl.control``, or of one of ours with its module; made of a SpaceInformation."""
     defaults: FilledSettings = FilledSettings()
     """What stands for settings that are left out."""
     default_gains: Callable[[Limits], Gains] = lambda _: Gains()
     """What stands for gains that are left out, by the limits of the robot."""
+
+    @property
+    def optimises(self) -> bool:
+        """Whether it goes on by optimal control without being asked."""
+        return self.is_anytime and not self.is_bounded
 
     def law(self, planning: PlanningSettings) -> int:
         """How it drives: `STEERING`, `CLOSED_LOOP` or `OPEN_LOOP` (as OMPL's own planners do)."""
@@ -94,6 +101,16 @@ PLANNERS: dict[str, Planner] = {
         _KANAYAMA,
         is_robust=True,
         is_anytime=True,
+        defaults=FOR_MAPS,
+        default_gains=gains_for,
+    ),
+    "cb-rrt-ao": Planner(
+        "cb-rrt-robust, and then better and better by sampling: AO-RRT, a baseline",
+        _COMPILED,
+        _KANAYAMA,
+        is_robust=True,
+        is_anytime=True,
+        is_bounded=True,
         defaults=FOR_MAPS,
         default_gains=gains_for,
     ),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from copy import copy
@@ -15,6 +16,7 @@ from cbrrt_ompl.motion.model import make_model
 from cbrrt_ompl.motion.records import Records, record_array
 from cbrrt_ompl.planners.first_plan import FirstPlan
 from cbrrt_ompl.planners.growth import (
+    BOUNDED_DRAWS,
     DRAWS,
     GROW_REACHED,
     GROW_WANTS_DRAWS,
@@ -85,10 +87,16 @@ class Search:
         self._steps = record_array(1, STEPS)
         self._plant(seed)
 
-    def again(self, seed: int) -> Search:
-        """A search like this one from another seed, before its first sample; what is known of the world is shared."""
+    def again(self, seed: int, most_steps: float = math.inf) -> Search:
+        """A search like this one from another seed, before its first sample; what is known of the world is shared.
+
+        Args:
+            seed: of the other one's own generator.
+            most_steps: see :meth:`bound`.
+        """
         other = copy(self)
         other._plant(seed)
+        other.bound(most_steps)
         return other
 
     def _plant(self, seed: int | None) -> None:
@@ -98,6 +106,7 @@ class Search:
         self._draws: NDArray[np.float64] = np.empty((0, ROBUST_DRAWS if self._is_robust else DRAWS))
         self._search = record_array(1, SEARCH)
         self._search["goal_bias"], self._search["is_robust"] = self._goal_bias, self._is_robust
+        self._search["most_steps"] = math.inf
         capacity = max(FIRST_CAPACITY, 2 * len(self._starts))
         self._tree = record_array(capacity, NODE)
         self._index = make_index(KINDS[self._neighbours], self._bounds, capacity)
@@ -107,7 +116,13 @@ class Search:
             add_node(self._tree, self._index, number, -1)
             self._search["nodes"] += 1
 
-    def run(self, should_stop: Callable[[int], bool], max_samples: int) -> None:
+    def bound(self, most_steps: float) -> None:
+        """Keep only nodes that may be in the goal within so many steps from a root; before the first sample."""
+        self._search["most_steps"] = most_steps
+        if most_steps < math.inf:
+            self._draws = np.empty((0, BOUNDED_DRAWS))
+
+    def run(self, should_stop: Callable[[int], bool], max_samples: float) -> None:
         """Grow the tree until a node is in the goal region.
 
         Args:
@@ -119,7 +134,7 @@ class Search:
             if should_stop(self.samples):
                 return
             before, began = self.samples, time.perf_counter()
-            self._grow(min(max_samples, before + portion))
+            self._grow(int(min(max_samples, before + portion)))
             elapsed = max(time.perf_counter() - began, 1e-6)
             done = self.samples - before
             portion = int(min(max(16, done * PAUSE / elapsed), 4 * portion))
@@ -170,6 +185,12 @@ class Search:
     def samples(self) -> int:
         """Samples drawn so far."""
         return int(self._search["samples"][0])
+
+    @property
+    def total_steps(self) -> NDArray[np.int32]:
+        """Integration steps of the way from a root to each node, shape (n,)."""
+        steps: NDArray[np.int32] = self._tree["total_steps"][: self.nodes]
+        return steps
 
     @property
     def refusals(self) -> int:

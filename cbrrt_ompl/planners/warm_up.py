@@ -26,7 +26,7 @@ def warm_up() -> None:
     model = make_model(OPEN_LOOP, Robot(), Goal(90.0, 90.0, tolerance=1e-9), PlanningSettings())
     search = Search(model, world, Footprint.point(), [State(50.0, 50.0)], seed=0)
     with compiled_beside(__name__, "warm_up_roll_out", grow):
-        nearest(make_index(GRID, world.bounds, FIRST_CAPACITY), 50.0, 50.0, 0, math.inf)
+        nearest(make_index(GRID, world.bounds, FIRST_CAPACITY), 50.0, 50.0, 0, math.inf, math.inf)
         search.tree()
         reachable_cells(world.scene(Footprint.disc(0.5)), [State(50.0, 50.0)])
         free_steps(record_array(1, STEPS)[0], 0, True, 0.0, True, world.scene(Footprint.point()), model[0])

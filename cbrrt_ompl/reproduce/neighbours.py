@@ -81,7 +81,7 @@ def answer(index: Index, queries: NDArray[np.float64], count: int) -> float:
     """Ask all queries, shape (m, 2); the sum of the distances keeps the compiler from leaving them out."""
     total = 0.0
     for i in range(len(queries)):
-        node = nearest(index, queries[i, 0], queries[i, 1], count, math.inf)
+        node = nearest(index, queries[i, 0], queries[i, 1], count, math.inf, math.inf)
         place = index.places[node]
         total += math.hypot(place.x - queries[i, 0], place.y - queries[i, 1])
     return total
