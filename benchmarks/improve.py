@@ -5,7 +5,8 @@ and rad/s (which the published solutions of second order keep), and forward only
 random free poses, against a true lower bound on the duration (benchmarks/lower_bound.py). BARN: a Jackal. Grid: a
 Jackal that arrives with a heading and at rest, its path against the shortest one over the cells and their eight
 neighbours. Kernels are warm and worlds known: the time of compilation and of a world's distance field is not in the
-table. Nothing is downloaded.
+table. Nothing is downloaded. With ``--scenes``, durations of both planners that go on after their first plan, after
+0.1, 1 and 10 s of CPU time: by optimal control, and by sampling.
 
     python benchmarks/improve.py --dynobench bugtrap_0.yaml kink_0.yaml --model unicycle2_v0.yaml --seeds 100
     python benchmarks/improve.py --dynobench unicycle1_kink_0.yaml --model unicycle1_v0.yaml
@@ -14,6 +15,7 @@ table. Nothing is downloaded.
     python benchmarks/improve.py --maps depot.yaml --pairs 100 --budget 100 --facing
     python benchmarks/improve.py --barn world_0.csv --seeds 10 --budget 200
     python benchmarks/improve.py --grid 100by100_10.yaml --pairs 50 --budget 150
+    python benchmarks/improve.py --scenes paper_case1 office maze kink_0.yaml --model unicycle2_v0.yaml --seeds 10
 """
 
 from __future__ import annotations
@@ -32,12 +34,15 @@ from maps import JACKAL, MAP_PLANNING, barn_scenarios, largest_free_part, map_sc
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from cbrrt_ompl import Goal, Scenario, State, load_dynobench, load_map, plan, verify
+from cbrrt_ompl import Goal, Scenario, State, load_dynobench, load_map, load_scenario, plan, verify
 from cbrrt_ompl.optimise.improving import Found
 from cbrrt_ompl.planners.registry import PLANNERS
 from cbrrt_ompl.planning import PlanResult
 
-PLANNER = next(name for name, row in PLANNERS.items() if row.is_anytime)
+PLANNER = next(name for name, row in PLANNERS.items() if row.optimises)
+
+MARKS = (0.1, 1.0, 10.0)
+"""CPU times after which planners are compared [s]."""
 
 PUBLISHED = {
     "bugtrap_0": 25.1,
@@ -125,6 +130,41 @@ def report(
     )
 
 
+def durations_after(scenario: Scenario, planner: str, seed: int) -> tuple[list[float], bool]:
+    """Durations of the best trajectories after some CPU times, infinite where there is none; whether the last is sound.
+
+    Args:
+        scenario: what to plan.
+        planner: an anytime planner.
+        seed: of the plan.
+    """
+    rows: list[tuple[float, float]] = []
+    began = time.process_time()
+    result = plan(
+        scenario,
+        planner,
+        seed,
+        time_limit=1e3,
+        improve_for=math.inf,
+        callback=lambda found: rows.append((time.process_time() - began, found.duration)),
+        should_stop=lambda: time.process_time() - began > MARKS[-1],
+    )
+    best = [min((duration for after, duration in rows if after <= mark), default=math.inf) for mark in MARKS]
+    return best, result.trajectory is not None and verify(result.trajectory, scenario).ok
+
+
+def report_scene(name: str, scenario: Scenario, seeds: int) -> None:
+    """Print a line a planner: median and worst durations after each time [s]."""
+    for planner in (name for name, row in PLANNERS.items() if row.is_anytime):
+        plan(scenario, planner, 0, improve_for=0.1)  # field and index of the world
+        found = [durations_after(scenario, planner, seed) for seed in range(seeds)]
+        durations = np.array([best for best, _ in found])  # (seeds, marks)
+        cells = zip(MARKS, np.median(durations, axis=0), durations.max(axis=0), strict=True)
+        texts = [f"{mark:g} s: {middle:6.2f} (worst {worst:6.2f})" for mark, middle, worst in cells]
+        verified = f"{sum(is_sound for _, is_sound in found)}/{seeds} verified"
+        print(f"{name:<16}{planner:<16}{'  '.join(texts)}  {verified}", flush=True)
+
+
 def facing_its_way(scenario: Scenario, seed: int) -> Scenario:
     """The same problem with a start that faces along the way, so that a bound that knows nothing of turning is near."""
     trajectory = plan(scenario, PLANNER, seed, max_iterations=2000).trajectory
@@ -199,11 +239,16 @@ def main() -> None:
     parser.add_argument("--facing", action="store_true", help="turn the starts of --maps along the way")
     parser.add_argument("--barn", type=Path, nargs="*", default=[], help="CSV files of discs in which the Jackal plans")
     parser.add_argument("--grid", type=Path, nargs="*", default=[], help="maps in which the Jackal arrives at rest")
+    parser.add_argument("--scenes", nargs="*", default=[], help="scenarios, or problems of dynobench's, to compare in")
     parser.add_argument("--pairs", type=int, default=100, help="random pairs of poses in a map")
     parser.add_argument("--seeds", type=int, default=100, help="plans of one problem")
     parser.add_argument("--budget", type=float, default=200.0, help="CPU time of a plan [ms]")
     arguments = parser.parse_args()
     budget = 1e-3 * arguments.budget
+    for scene in arguments.scenes:
+        is_dynobench = scene.endswith(".yaml") and arguments.model is not None
+        scenario = load_dynobench(scene, arguments.model, tolerance=0.03) if is_dynobench else load_scenario(scene)
+        report_scene(Path(scene).stem, scenario, arguments.seeds)
     for path in arguments.dynobench:
         for name, scenario in dynobench_cases(path, arguments.model, arguments.clearance):
             report(f"{name} [s]", [scenario] * arguments.seeds, budget, [1.0] * arguments.seeds)
