@@ -44,6 +44,9 @@ FIRST_SAMPLES = 5_000
 ANYTIME_ITERATIONS = 3000
 """Newton steps after which an anytime planner ends where neither they nor the time are given."""
 
+BOUNDED_SAMPLES = 50_000
+"""Samples after the first plan after which a bounded planner ends where neither they nor the time are given."""
+
 SOLVED, TIME_LIMIT, SAMPLE_LIMIT, NO_WAY = "solved", "time limit", "sample limit", "no way"
 """How a plan ends."""
 
@@ -136,7 +139,7 @@ def plan(
             :func:`cbrrt_ompl.improve`. None improves nothing, unless ``max_iterations`` is given.
         max_iterations: Newton steps to improve it for: the result is then the same on every run, unless the time ends
             it. ``cb-rrt-anytime`` ends by them where ``improve_for`` is not given. ``cb-rrt-ao`` improves by samples,
-            and this is their number; where neither is given, it ends by ``max_samples`` or ``time_limit``.
+            and this is their number; where neither is given, it ends by 50,000, ``max_samples`` or ``time_limit``.
         objective: what to improve; the duration if not given, and the only one that ``cb-rrt-ao`` takes.
         callback: called with each trajectory's time, duration and source, as they are found.
         should_stop: asked every few milliseconds whether to end the improvement with the best so far.
@@ -278,7 +281,7 @@ def _plan_bounded(
     if limits.max_iterations is not None:
         most_samples: float = search.samples + limits.max_iterations
     else:
-        most_samples = most if limits.improve_for is None else math.inf
+        most_samples = min(most, search.samples + BOUNDED_SAMPLES) if limits.improve_for is None else math.inf
     while trees.find_quicker(should_stop, most_samples):
         note(f"tree {trees.trees}")
     found = trees.best.first_plan(watch.elapsed())._replace(samples=trees.samples)

@@ -152,6 +152,7 @@ def test_it_ends_by_its_samples_and_repeats_itself() -> None:
     assert first.trajectory == second.trajectory
     assert [row[1:] for row in first.history] == [row[1:] for row in second.history]
     assert planned(scenario, seed=2).trajectory != first.trajectory
+    assert planned().samples == plan(SCENARIO, "cb-rrt-robust", seed=1).samples + 50_000
 
 
 def test_samples_of_an_improvement_are_counted_from_the_first_plan_on() -> None:
