@@ -1,10 +1,9 @@
 """What a round of a planner costs inside OMPL, with compiled and with Python methods behind OMPL's virtual calls.
 
 A round is one pass of the planner's main loop: one extension attempt of cb-rrt and s-rrt. The goal is out of reach, so
-that every run has as many rounds as asked. Printed is the CPU time, in microseconds, of the best of some repetitions,
-each the sum over some seeds; both kinds of methods take turns, and find the same trees. The rounds are counted by a
-termination condition in Python, which OMPL calls once a round: a microsecond of what is printed. Our planners count
-their samples, and are measured under OMPL's own time limit as well.
+that every run has as many rounds as asked. Printed is the CPU time, in microseconds, of a mean of some seeds, each at
+its best of some repetitions; both kinds of methods take turns, and find the same trees. The rounds are counted as
+`plan` counts them. Our planners count their samples, and are measured under OMPL's own time limit as well.
 
     python benchmarks/ompl_speed.py
     python benchmarks/ompl_speed.py --planners cb-rrt rrt --rounds 2000 --robot rectangle
@@ -53,8 +52,8 @@ def cost(scenario: Scenario, planner: str, rounds: int, seed: int) -> tuple[floa
 def costs(
     scenario: Scenario, planner: str, rounds: int, seeds: int, repetitions: int, python_repetitions: int
 ) -> tuple[float, float, float]:
-    """Microseconds a round with compiled and with Python methods, and nodes a run."""
-    best = {"1": math.inf, "0": math.inf}
+    """Microseconds a round with compiled and with Python methods, each seed at its best, and nodes a run."""
+    best = {kind: [math.inf] * seeds for kind in ("1", "0")}
     nodes: dict[str, list[int]] = {}
     for repetition in range(repetitions):
         for kind in best:
@@ -62,11 +61,12 @@ def costs(
                 continue
             os.environ[VARIABLE] = kind
             found = [cost(scenario, planner, rounds, seed) for seed in range(seeds)]
-            best[kind] = min(best[kind], sum(seconds for seconds, _ in found) / (rounds * seeds))
+            best[kind] = [min(before, seconds) for before, (seconds, _) in zip(best[kind], found, strict=True)]
             nodes[kind] = [count for _, count in found]
     if nodes["0"] != nodes["1"]:
         raise AssertionError(f"{planner}: compiled and Python methods make other trees")
-    return 1e6 * best["1"], 1e6 * best["0"], sum(nodes["1"]) / seeds
+    compiled, python = (1e6 * sum(best[kind]) / (rounds * seeds) for kind in ("1", "0"))
+    return compiled, python, sum(nodes["1"]) / seeds
 
 
 def cost_by_the_clock(scenario: Scenario, planner: str, seeds: int, repetitions: int) -> float:

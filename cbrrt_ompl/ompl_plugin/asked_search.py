@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from cbrrt_ompl.motion.model import CLOSED_LOOP
 from cbrrt_ompl.ompl_plugin.binding import ob
 from cbrrt_ompl.ompl_plugin.extender import Extender
 from cbrrt_ompl.ompl_plugin.space import bounds_of, read_state, write_state
@@ -67,7 +68,7 @@ class AskedSearch(Search):
         place = max(nearest(self._index, x, y, self.nodes, most_failures, math.inf), 0)
         parent = one_of_twins(self._tree, place, draw[3])
         node, state = self._tree[parent], self._state_of(parent)
-        if self._search["is_robust"][0]:
+        if self._search["is_robust"][0] and self.model["law"][0] == CLOSED_LOOP:
             failures = int(self._index.places["failures"][place])
             x, y = shortened((x, y), state.x, state.y, failures, self.model["look_ahead"][0])
         first_child = int(node["first_child"])

@@ -1,8 +1,9 @@
 """The compiled loop: Algorithms I and II of the paper over arrays of records.
 
 The robust kind departs from the paper in two lines: what is extended is the nearest place that is not passed over; and
-the more extensions from a place have failed, the likelier it is passed over, and the shorter is the next one's way
-(docs/robust.md). A bounded search keeps only what may be in the goal within so many steps (docs/improve.md).
+the more extensions from a place have failed, the likelier it is passed over, and the shorter is the next one's way in
+closed loop (docs/robust.md). A bounded search keeps only what may be in the goal within so many steps
+(docs/improve.md).
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from cbrrt_ompl.collision.scene import Scene
 from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.motion.manoeuvres import is_manoeuvre
-from cbrrt_ompl.motion.model import in_goal
+from cbrrt_ompl.motion.model import CLOSED_LOOP, in_goal
 from cbrrt_ompl.motion.records import Record, Records
 from cbrrt_ompl.planners.extension import EXTENDED, NO_CHILD, REFUSED, UNTRIED, Extension, extend
 from cbrrt_ompl.planners.nearest import KD_TREE, Index, insert, leave_out, nearest
@@ -233,7 +234,7 @@ def grow(
         if node.margin < 0.0:
             node.margin, node.any_heading = margin_at(node.x, node.y, node.theta, scene, model.room)
         state = (node.x, node.y, node.theta, node.v, node.omega)
-        if search.is_robust:
+        if search.is_robust and model.law == CLOSED_LOOP:
             sample = shortened(sample, node.x, node.y, index.places[place].failures, model.look_ahead)
         extension = extend(state, (node.margin, node.any_heading), sample, node.first_child, tree, scene, model, steps)
         if node.first_child == UNTRIED:
