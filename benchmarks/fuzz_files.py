@@ -135,7 +135,7 @@ def kinds() -> list[Kind]:
     rgba = np.dstack([pixels, pixels, pixels, np.full_like(pixels, 255)])
     images["rgba.png"] = _image(rgba, "png")
     maps = {"map.yaml": MAP.encode(), **images}
-    t: NDArray[np.float64] = np.linspace(0.0, 0.4, 5)
+    t: NDArray[np.float64] = np.linspace(0.0, 0.4, 5, dtype=np.float64)
     trajectory = Trajectory(t, t * 0.1 - 4.0, 0.0 * t - 4.0, 0.0 * t, 0.0 * t + 0.1, 0.0 * t, 0.0 * t + 0.1, 0.0 * t)
     with tempfile.TemporaryDirectory() as folder:
         trajectories = {}

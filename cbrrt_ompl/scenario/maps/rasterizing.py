@@ -75,8 +75,8 @@ def _draw(occupied: NDArray[np.bool_], obstacle: Obstacle, x0: float, y0: float,
     if isinstance(obstacle, Box):
         occupied[bottom:top, left:right] = True
         return
-    low = y0 + resolution * (np.arange(bottom, top) + SLACK)
-    high = low + resolution * (1.0 - 2.0 * SLACK)
+    low: NDArray[np.float64] = y0 + resolution * (np.arange(bottom, top, dtype=np.float64) + SLACK)
+    high: NDArray[np.float64] = low + resolution * (1.0 - 2.0 * SLACK)
     if isinstance(obstacle, Disc):
         extents = [_extent_of_disc(obstacle, low, high)]
     else:
@@ -85,8 +85,8 @@ def _draw(occupied: NDArray[np.bool_], obstacle: Obstacle, x0: float, y0: float,
         is_reached = least <= most
         first = np.ceil((least[is_reached] - x0) / resolution - 1.0 + SLACK).clip(left, right).astype(int)
         end = np.floor((most[is_reached] - x0) / resolution + 1.0 - SLACK).clip(left, right).astype(int)
-        rows = bottom + np.flatnonzero(is_reached)
-        for row, start, stop in zip(rows.tolist(), first.tolist(), end.tolist(), strict=True):
+        reached = (bottom + np.flatnonzero(is_reached)).tolist()
+        for row, start, stop in zip(reached, first.tolist(), end.tolist(), strict=True):
             occupied[row, start:stop] = True
 
 
