@@ -39,8 +39,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ("show tour.yaml --figure mask.png", "mask.png"),
         ("show tour.yaml --figure ./depot.png", "depot.png"),
         ("plan depot.yaml --robot jackal --start 1 1 0 --goal 3 3 --seed 1 --figure depot.png", "depot.png"),
-        ("plan tour.yaml --seed 1 --trajectory depot.yaml", "depot.yaml"),
-        ("plan empty.yaml --seed 1 --trajectory empty.yaml", "empty.yaml"),
+        ("plan tour.yaml --planner cb-rrt-robust --trajectory depot.yaml", "depot.yaml"),
+        ("plan empty.yaml --planner cb-rrt-robust --trajectory empty.yaml", "empty.yaml"),
         ("improve given.csv empty.yaml --output empty.yaml", "empty.yaml"),
         ("drive tour.yaml --seed 1 --figure mask.png", "mask.png"),
     ],
@@ -60,5 +60,5 @@ def test_a_file_that_is_read_is_not_written_over(
 def test_what_an_earlier_command_wrote_is_written_over(folder: Path) -> None:
     for _ in range(2):
         assert main("show depot.yaml --figure picture.png".split()) == 0
-        assert main("plan empty.yaml --seed 1 --trajectory path.yaml".split()) == 0
+        assert main("plan empty.yaml --planner cb-rrt-robust --trajectory path.yaml".split()) == 0
         assert main("verify path.yaml empty.yaml --collisions-only".split()) == 0
