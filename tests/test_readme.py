@@ -11,6 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 import pytest
 from PIL import Image
@@ -54,6 +55,9 @@ def test_the_example_has_ten_lines_of_code(readme: str) -> None:
     assert len([line for line in example.splitlines() if line.strip()]) <= 10
 
 
+@pytest.mark.skipif(
+    matplotlib.__version_info__ < (3, 11), reason="it was drawn by matplotlib 3.11, and older ones lay it out otherwise"
+)
 def test_the_picture_is_what_the_command_beside_it_makes(readme: str, repository: Path) -> None:
     """Its last frame, drawn again from the command's scenario, planner and seed."""
     picture, command = re.findall(r"!\[.*\]\((.*\.gif)\)", readme)[0], blocks(readme, "console")[0]
