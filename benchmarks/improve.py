@@ -79,7 +79,14 @@ class Outcome(NamedTuple):
     is_verified: bool
 
 
-def plan_for(scenario: Scenario, seed: int, budget: float) -> tuple[PlanResult, list[tuple[float, Found]]]:
+def plan_for(
+    scenario: Scenario,
+    seed: int,
+    budget: float,
+    planner: str = PLANNER,
+    time_limit: float = 10.0,
+    max_iterations: int | None = ITERATIONS,
+) -> tuple[PlanResult, list[tuple[float, Found]]]:
     """Plan for some CPU time [s]; the result, and what was found after which CPU time [s]."""
     rows: list[tuple[float, Found]] = []
     began = time.process_time()
@@ -89,10 +96,11 @@ def plan_for(scenario: Scenario, seed: int, budget: float) -> tuple[PlanResult, 
 
     result = plan(
         scenario,
-        PLANNER,
+        planner,
         seed,
-        time_limit=10.0,
-        max_iterations=ITERATIONS,
+        time_limit=time_limit,
+        improve_for=math.inf if max_iterations is None else None,
+        max_iterations=max_iterations,
         callback=lambda found: rows.append((elapsed(), found)),
         should_stop=lambda: elapsed() > budget,
     )
@@ -138,18 +146,8 @@ def durations_after(scenario: Scenario, planner: str, seed: int) -> tuple[list[f
         planner: an anytime planner.
         seed: of the plan.
     """
-    rows: list[tuple[float, float]] = []
-    began = time.process_time()
-    result = plan(
-        scenario,
-        planner,
-        seed,
-        time_limit=1e3,
-        improve_for=math.inf,
-        callback=lambda found: rows.append((time.process_time() - began, found.duration)),
-        should_stop=lambda: time.process_time() - began > MARKS[-1],
-    )
-    best = [min((duration for after, duration in rows if after <= mark), default=math.inf) for mark in MARKS]
+    result, rows = plan_for(scenario, seed, MARKS[-1], planner, time_limit=1e3, max_iterations=None)
+    best = [min((found.duration for after, found in rows if after <= mark), default=math.inf) for mark in MARKS]
     return best, result.trajectory is not None and verify(result.trajectory, scenario).ok
 
 

@@ -219,7 +219,7 @@ def _plan_anytime(
     scenario: Scenario, planner: str, seed: int | None, watch: _Watch, improver: Improver, budget: float
 ) -> PlanResult:
     """The first plan of CB-RRT, or of the geodesic where that takes long; then guess after guess."""
-    first_seed = int(np.random.default_rng().integers(2**31)) if seed is None else seed
+    first_seed = _seed_or_fresh(seed)
     search, most = robust_search(scenario, first_seed), scenario.planning.filled().max_samples
     watch.start()
     improver.begin(watch.left(), watch.began)
@@ -237,6 +237,11 @@ def _plan_anytime(
     if improver.best is not None:
         improver.explore(further_guesses(scenario, search, first_seed, improver.has_ended))
     return _with_best(result, improver)
+
+
+def _seed_or_fresh(seed: int | None) -> int:
+    """A seed, or a fresh one where none is given."""
+    return int(np.random.default_rng().integers(2**31)) if seed is None else seed
 
 
 class _Limits(NamedTuple):
@@ -257,7 +262,7 @@ def _plan_bounded(
 ) -> PlanResult:
     """The first plan, and then those of trees that are bounded by the best."""
     row, most = PLANNERS[planner], scenario.planning.filled().max_samples
-    first_seed = int(np.random.default_rng().integers(2**31)) if seed is None else seed
+    first_seed = _seed_or_fresh(seed)
     search = search_in(scenario, row.law(scenario.planning), first_seed, robust=row.is_robust)
     watch.start()
     search.run(watch.should_stop, most)

@@ -193,29 +193,22 @@ def test_a_node_without_a_place_of_its_own_is_never_found(kind: int) -> None:
 
 
 @KINDS
-def test_the_nearest_node_within_the_limit_of_failures_is_found(kind: int) -> None:
-    rng = np.random.default_rng(1)
-    positions, failures = rng.uniform(-5.0, 5.0, (60, 2)), rng.integers(0, 20, 60)
+@pytest.mark.parametrize(
+    ("seed", "field", "argument", "lowest", "most"),
+    [(1, "failures", "most_failures", 0.0, 20), (2, "steps", "most_steps", -20.0, 400)],
+)
+def test_the_nearest_node_within_a_limit_of_failures_or_steps_is_found(
+    kind: int, seed: int, field: str, argument: str, lowest: float, most: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    positions, values = rng.uniform(-5.0, 5.0, (60, 2)), rng.integers(0, most, 60)
     nodes = Nodes(kind, WORLD, 60)
     nodes.enter(positions)
-    nodes.index.places["failures"] = failures
-    for x, y, limit in rng.uniform((-5.0, -5.0, 0.0), (5.0, 5.0, 20.0), (200, 3)).tolist():
-        distances = np.where(failures <= limit, np.hypot(*(positions - (x, y)).T), np.inf)
+    nodes.index.places[field] = values
+    for x, y, limit in rng.uniform((-5.0, -5.0, lowest), (5.0, 5.0, float(most)), (200, 3)).tolist():
+        distances = np.where(values <= limit, np.hypot(*(positions - (x, y)).T), np.inf)
         expected = int(distances.argmin()) if np.isfinite(distances).any() else -1
-        assert nodes.nearest(x, y, limit) == expected
-
-
-@KINDS
-def test_the_nearest_node_within_so_many_steps_from_the_root_is_found(kind: int) -> None:
-    rng = np.random.default_rng(2)
-    positions, steps = rng.uniform(-5.0, 5.0, (60, 2)), rng.integers(0, 400, 60)
-    nodes = Nodes(kind, WORLD, 60)
-    nodes.enter(positions)
-    nodes.index.places["steps"] = steps
-    for x, y, limit in rng.uniform((-5.0, -5.0, -20.0), (5.0, 5.0, 400.0), (200, 3)).tolist():
-        distances = np.where(steps <= limit, np.hypot(*(positions - (x, y)).T), np.inf)
-        expected = int(distances.argmin()) if np.isfinite(distances).any() else -1
-        assert nodes.nearest(x, y, most_steps=limit) == expected
+        assert nodes.nearest(x, y, **{argument: limit}) == expected
 
 
 @KINDS

@@ -17,7 +17,7 @@ from cbrrt_ompl.errors import Problem, SettingsError, TrajectoryError
 from cbrrt_ompl.optimise.clearance import clearances
 from cbrrt_ompl.optimise.guess import Guess, guess_from_trajectory, refined
 from cbrrt_ompl.optimise.guesses import AHEAD, BACKWARDS, geodesic, guess_along
-from cbrrt_ompl.optimise.lead import begun_later, joined, lead_rows, split
+from cbrrt_ompl.optimise.lead import begun_later, joined, lead_rows, split_at
 from cbrrt_ompl.optimise.objective import Objective
 from cbrrt_ompl.optimise.program import STEP
 from cbrrt_ompl.optimise.repair import solve_and_repair
@@ -162,7 +162,7 @@ class Improver:
             row = lead_rows(trajectory, self._scenario, self._transcription.margin)
             if row > 0:
                 others = None  # those begin at the start
-                self._lead, trajectory = split(trajectory, row)
+                self._lead, trajectory = split_at(trajectory, row)
                 self._scenario = begun_later(self._scenario, self._lead)
                 self._transcription = Transcription(
                     self._scenario, self._objective, is_kinematic=self._transcription.is_kinematic

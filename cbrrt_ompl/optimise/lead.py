@@ -26,7 +26,7 @@ def lead_rows(trajectory: Trajectory, scenario: Scenario, room: float) -> int:
     return int(np.argmax(clearances(trajectory.states, scenario) >= room))
 
 
-def split(trajectory: Trajectory, row: int) -> tuple[Trajectory, Trajectory]:
+def split_at(trajectory: Trajectory, row: int) -> tuple[Trajectory, Trajectory]:
     """A trajectory up to a row and from there on, where its time begins anew."""
     columns = [getattr(trajectory, name) for name in COLUMNS]
     after = [column[row:] for column in columns]
