@@ -12,7 +12,7 @@ from cbrrt_ompl.collision.scene import Scene
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import Problem, SettingsError
 from cbrrt_ompl.kernels import kernel
-from cbrrt_ompl.motion.laws import is_compiled_law, raise_errors
+from cbrrt_ompl.motion.laws import is_compiled_law, law_address, raise_errors
 from cbrrt_ompl.motion.model import CLOSED_LOOP, MODEL, OPEN_LOOP, STEERING, check_step, make_model
 from cbrrt_ompl.motion.records import Records, record_array
 from cbrrt_ompl.ompl_plugin.asked_extension import OmplSteps
@@ -87,6 +87,7 @@ class Extender:
         self._goal, self._ompl_goal = goal, ompl_goal
         self.scene = world.scene(robot.footprint)
         self.model = record_array(1, MODEL)
+        self._made_for: tuple[Goal, int] | None = None
         self._control_dimension = si.getControlSpace().getDimension()
         self._extension = record_array(1, EXTENSION)
         self.block = record_array(1, STEPS)
@@ -122,7 +123,10 @@ class Extender:
         law = STEERING if self._kinematic else CLOSED_LOOP if planning.closed_loop else OPEN_LOOP
         region = self._goal if self._ompl_goal is None else region_of(self._ompl_goal, space)
         model = self.model
-        model[:] = make_model(law, self._robot, region or NOWHERE, planning)
+        made_for = (region or NOWHERE, law_address(planning.law))
+        if self._made_for != made_for:
+            self._made_for, self._made = made_for, make_model(law, self._robot, made_for[0], planning)
+        model[:] = self._made
         step = si.getPropagationStepSize()
         propagator = si.getStatePropagator()
         is_set_up = not step <= 0.0  # it is 0 until then

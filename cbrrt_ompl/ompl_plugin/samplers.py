@@ -70,6 +70,10 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         self._node, self._sample = StateReals(space, STATE_DIMENSION), StateReals(space, STATE_DIMENSION)
         self._control_dimension = si.getControlSpace().getDimension()
         self._children = Children()
+        extender, record = self.extender, self._record
+        enter_scene(record, extender.scene)
+        record["model"], record["block"] = extender.model.ctypes.data, extender.block.ctypes.data
+        record["dimension"], record["look_period"] = self._control_dimension, LOOK_PERIOD
         self._tell_record()
         if type(self).sampleTo is _SAMPLE_TO and use_compiled_methods(compiled):
             make_sampler_native(self, self._record)
@@ -129,15 +133,12 @@ class ExtensionSampler(oc.DirectedControlSampler):  # type: ignore[misc]  # OMPL
         return extender.steps
 
     def _tell_record(self) -> None:
-        """Tell the compiled method where everything is, and whether it may decide."""
+        """Tell the compiled method where the children are, and whether it may decide."""
         record, extender, children = self._record, self.extender, self._children
-        enter_scene(record, extender.scene)
-        record["model"], record["block"] = extender.model.ctypes.data, extender.block.ctypes.data
         record["parents"], record["children"] = children.parents.ctypes.data, children.records.ctypes.data
         record["counts"], record["capacity"] = children.counts.ctypes.data, len(children.records)
-        record["slots"], record["dimension"] = len(children.parents), self._control_dimension
+        record["slots"] = len(children.parents)
         record["is_compiled"] = extender.is_compiled and extender.has_compiled_law
-        record["look_period"] = LOOK_PERIOD
 
 
 _SAMPLE_TO = ExtensionSampler.sampleTo

@@ -129,7 +129,7 @@ def _bounds_problems(si: Any, scenario: Scenario, planner: str, closed_loop: boo
         low, high = bounds.min, bounds.max
         expected = f"those of the world: controls are references, which {planner} chooses; {FREE_PLANNERS} take others"
     controls = si.getControlSpace().getBounds()
-    found = (*list(controls.low)[:2], *list(controls.high)[:2])
+    found = (controls.low[0], controls.low[1], controls.high[0], controls.high[1])
     if found != (*low, *high):
         problems.append(Problem("bounds of the control space", found, expected))
     return problems
