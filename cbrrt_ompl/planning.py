@@ -19,10 +19,11 @@ from cbrrt_ompl.kernels.beside import compiled_beside
 from cbrrt_ompl.motion.model import ROOM, check_step, jumps, make_model
 from cbrrt_ompl.ompl_plugin.availability import check_ompl, has_ompl
 from cbrrt_ompl.optimise.anytime import further_guesses, robust_search
-from cbrrt_ompl.optimise.guess import Guess
+from cbrrt_ompl.optimise.guess import Guess, guess_at_full_speed
 from cbrrt_ompl.optimise.improving import Found, Improver, check_improvement, geodesic_guesses
 from cbrrt_ompl.optimise.improving import warm_up as warm_up_improvement
 from cbrrt_ompl.optimise.interior_point import iterate
+from cbrrt_ompl.optimise.lattice_plan import STATE_LATTICE, lattice_plan
 from cbrrt_ompl.optimise.objective import Objective
 from cbrrt_ompl.planners.bounded import BoundedTrees
 from cbrrt_ompl.planners.first_plan import FirstPlan
@@ -218,22 +219,31 @@ def available_planners() -> list[str]:
 def _plan_anytime(
     scenario: Scenario, planner: str, seed: int | None, watch: _Watch, improver: Improver, budget: float
 ) -> PlanResult:
-    """The first plan of CB-RRT, or of the geodesic where that takes long; then guess after guess."""
+    """The first plan of CB-RRT, or where that takes long of the lattice or the geodesic; then guess after guess."""
     first_seed = _seed_or_fresh(seed)
     search, most = robust_search(scenario, first_seed), scenario.planning.filled().max_samples
     watch.start()
     improver.begin(watch.left(), watch.began)
     search.run(watch.should_stop, min(FIRST_SAMPLES, most))
     others: list[Guess] | None = None
+    found: Trajectory | None = None
     if not search.has_reached_goal:
-        improver.run(geodesic_guesses(scenario))
-        others = []  # the geodesics have been tried
-        if improver.best is None:
-            search.run(watch.should_stop, most)
+        limits = scenario.robot.limits
+        found = lattice_plan(scenario, lambda: watch.should_stop(search.samples), is_kinematic=limits.is_first_order)
+        others = geodesic_guesses(scenario)
+        if found is not None:
+            others.append(guess_at_full_speed(found, limits, f"{STATE_LATTICE} at full speed"))
+        else:
+            improver.run(others)
+            others = []  # the geodesics have been tried
+            if improver.best is None:
+                search.run(watch.should_stop, most)
     result = _result_of(search.first_plan(watch.elapsed()), planner, seed, watch.ended_by)
     improver.begin(budget, watch.began)
     if search.has_reached_goal:
         improver.improve(search.trajectory(), planner, others)
+    elif found is not None:
+        improver.improve(found, STATE_LATTICE, others)
     if improver.best is not None:
         improver.explore(further_guesses(scenario, search, first_seed, improver.has_ended))
     return _with_best(result, improver)
@@ -431,6 +441,8 @@ class _Watch:
 
     def should_stop(self, samples: int) -> bool:
         """Whether the time is up or there is no way; being Python code, this also lets a Ctrl-C through."""
+        if self.ended_by == NO_WAY:
+            return True
         now = time.perf_counter()
         if now - self.began >= self._time_limit:
             self.ended_by = TIME_LIMIT

@@ -101,6 +101,56 @@ def shortest_path(costs: NDArray[np.float32], columns: int, begin: int, end: int
     return np.empty(0, dtype=np.int64)
 
 
+@kernel
+def ways_to(costs: NDArray[np.float32], columns: int, end: int, begin: int, more: float) -> NDArray[np.float32]:
+    """Costs of the cheapest paths from all cells to one, by Dijkstra's algorithm, shape (rows * columns,).
+
+    Args:
+        costs: of a metre in each cell, 1 or more, shape (rows * columns,).
+        columns: of the grid.
+        end: the cell to which the paths lead.
+        begin: a cell of which the cost is of interest.
+        more: those that cost more than so many times as much are not.
+
+    Returns:
+        Costs in terms of the side of a cell; infinite where they are not of interest, or there is no path.
+    """
+    count = len(costs)
+    rows = count // columns
+    best = np.empty(count, dtype=np.float32)
+    for cell in range(count):
+        best[cell] = math.inf
+    keys, cells = np.empty(1024, dtype=np.float32), np.empty(1024, dtype=np.int32)
+    best[end] = 0.0
+    most = math.inf
+    size = heap_push(keys, cells, 0, np.float32(0.0), end)
+    while size > 0:
+        key, here = keys[0], cells[0]
+        size = heap_pop(keys, cells, size)
+        if key > best[here]:
+            continue
+        if key > most:
+            break
+        if here == begin:
+            most = more * key
+        row, column = here // columns, here % columns
+        for step in MOVES:
+            i, j = column + step[0], row + step[1]
+            if i < 0 or j < 0 or i >= columns or j >= rows:
+                continue
+            there = j * columns + i
+            if costs[there] == np.inf:
+                continue
+            length = math.sqrt(float(step[0] * step[0] + step[1] * step[1]))
+            reached = np.float32(key + length * 0.5 * (costs[here] + costs[there]))
+            if reached < best[there]:
+                best[there] = reached
+                if size == len(keys):
+                    keys, cells = doubled(keys), doubled(cells)
+                size = heap_push(keys, cells, size, reached, there)
+    return best
+
+
 @inner_kernel
 def walk_back(parents: NDArray[np.int32], begin: int, end: int) -> NDArray[np.int64]:
     """The cells from the first to the last."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cbrrt_ompl.optimise.program import OMEGA, STEP, THETA, V
-from cbrrt_ompl.problem.robot import Limits
+from cbrrt_ompl.problem.robot import REST, Limits
 from cbrrt_ompl.trajectory.trajectory import Trajectory
 
 INTERVAL = 0.55
@@ -66,6 +66,17 @@ def guess_from_trajectory(trajectory: Trajectory, limits: Limits, source: str) -
     states = trajectory.at(times)
     states[:, THETA] = np.unwrap(states[:, THETA])
     return with_controls(states, trajectory.duration / n, source)
+
+
+def guess_at_full_speed(trajectory: Trajectory, limits: Limits, source: str) -> Guess:
+    """The poses of a trajectory, each as soon after the one before as the velocities allow: without its stops."""
+    poses, v_top = trajectory.poses.copy(), np.where(trajectory.v_command < 0.0, -limits.v_min, limits.v_max)[:-1]
+    poses[:, THETA] = np.unwrap(poses[:, THETA])
+    moved, turned = np.hypot(*np.diff(poses[:, :THETA], axis=0).T), np.diff(poses[:, THETA])
+    omega_top = np.where(turned < 0.0, -limits.omega_min, limits.omega_max)
+    spans = np.maximum(moved / np.maximum(v_top, REST), np.abs(turned) / np.maximum(omega_top, REST)) + 1e-5
+    path = np.column_stack([np.append(0.0, np.cumsum(spans)), poses])
+    return guess_from_path(path, trajectory.states[0], limits, source)
 
 
 def guess_from_path(path: NDArray[np.float64], start: ArrayLike, limits: Limits, source: str) -> Guess:

@@ -12,6 +12,7 @@ from cbrrt_ompl.optimise.clearance import least_clearance
 from cbrrt_ompl.optimise.field import field_of
 from cbrrt_ompl.optimise.geodesic import cell_costs, shortest_path
 from cbrrt_ompl.optimise.guess import Guess, guess_from_path
+from cbrrt_ompl.problem.obstacles import Bounds
 from cbrrt_ompl.problem.robot import Footprint
 from cbrrt_ompl.scenario.scenario import Scenario
 
@@ -70,31 +71,56 @@ def _shortest_path(
     scenario: Scenario, inner: float, outer: float, avoid: Sequence[NDArray[np.float64]]
 ) -> NDArray[np.float64] | None:
     bounds = scenario.world.bounds
-    width, height = bounds.size
-    cell = max(math.sqrt(width * height / MOST_CELLS), min(LARGEST_CELL, max(inner / LEAST_ROOM, SMALLEST_CELL)))
+    cell = cell_side(bounds, inner)
     inner, outer = max(inner, LEAST_ROOM * cell), max(outer, LEAST_ROOM * cell)
-    columns, rows = math.ceil(width / cell), math.ceil(height / cell)
-    (x_min, y_min), start, goal = bounds.min, scenario.start, scenario.goal
-    costs = cell_costs(*field_of(scenario.world), bounds.min, cell, (rows, columns), inner, outer)
-    ends, reach = [], math.ceil(outer / cell)
-    for x, y in ((start.x, start.y), (goal.x, goal.y)):
-        i, j = min(int((x - x_min) / cell), columns - 1), min(int((y - y_min) / cell), rows - 1)
-        around = costs.reshape(rows, columns)[max(j - reach, 0) : j + reach + 1, max(i - reach, 0) : i + reach + 1]
-        around[np.isinf(around)] = 10.0  # the ends are free, however the grid sees them
-        ends.append(j * columns + i)
+    costs, ends = cells_of(scenario, cell, inner, outer)
+    reach = math.ceil(outer / cell)
     for path in avoid:
         along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
         inside = path[(along > 0.2 * along[-1]) & (along < 0.8 * along[-1])]
-        marked = np.zeros(rows * columns, dtype=np.bool_)
+        marked = np.zeros(costs.shape, dtype=np.bool_)
         for i, j in np.floor((inside - bounds.min) / cell).astype(int).tolist():
-            around = marked.reshape(rows, columns)[max(j - reach, 0) : j + reach + 1, max(i - reach, 0) : i + reach + 1]
-            around[:] = True
+            marked[max(j - reach, 0) : j + reach + 1, max(i - reach, 0) : i + reach + 1] = True
         costs[marked] *= AVOIDANCE
-    cells = shortest_path(costs, columns, *ends)
+    columns = costs.shape[1]
+    cells = shortest_path(costs.ravel(), columns, *ends)
     if not len(cells):
         return None
+    (x_min, y_min), start, goal = bounds.min, scenario.start, scenario.goal
     points = np.column_stack([x_min + (cells % columns + 0.5) * cell, y_min + (cells // columns + 0.5) * cell])
     return np.concatenate([[(start.x, start.y)], points[1:-1], [(goal.x, goal.y)]])
+
+
+def cell_side(bounds: Bounds, inner: float) -> float:
+    """Side of the cells of a grid for a disc of some radius [m]."""
+    width, height = bounds.size
+    return max(math.sqrt(width * height / MOST_CELLS), min(LARGEST_CELL, max(inner / LEAST_ROOM, SMALLEST_CELL)))
+
+
+def cells_of(scenario: Scenario, cell: float, inner: float, outer: float) -> tuple[NDArray[np.float32], list[int]]:
+    """What a metre costs in each cell of a grid over the bounds, and which cells the start and the goal are in.
+
+    Args:
+        scenario: world, start and goal.
+        cell: side of a cell [m].
+        inner: see :func:`cbrrt_ompl.optimise.geodesic.cell_costs` [m].
+        outer: see above [m].
+
+    Returns:
+        Costs, shape (rows, columns), and indices into all cells, a row after the other.
+    """
+    bounds = scenario.world.bounds
+    (width, height), (x_min, y_min) = bounds.size, bounds.min
+    columns, rows = math.ceil(width / cell), math.ceil(height / cell)
+    costs = cell_costs(*field_of(scenario.world), bounds.min, cell, (rows, columns), inner, outer)
+    costs = costs.reshape(rows, columns)
+    ends, reach = [], math.ceil(outer / cell)
+    for x, y in ((scenario.start.x, scenario.start.y), (scenario.goal.x, scenario.goal.y)):
+        i, j = min(int((x - x_min) / cell), columns - 1), min(int((y - y_min) / cell), rows - 1)
+        around = costs[max(j - reach, 0) : j + reach + 1, max(i - reach, 0) : i + reach + 1]
+        around[np.isinf(around)] = 10.0  # the ends are free, however the grid sees them
+        ends.append(j * columns + i)
+    return costs, ends
 
 
 def guess_along(path: NDArray[np.float64], scenario: Scenario, gear: int, source: str) -> Guess:

@@ -15,8 +15,9 @@ from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import Problem, SettingsError, TrajectoryError
 from cbrrt_ompl.optimise.clearance import clearances
-from cbrrt_ompl.optimise.guess import Guess, guess_from_trajectory, refined
+from cbrrt_ompl.optimise.guess import Guess, guess_at_full_speed, guess_from_trajectory, refined
 from cbrrt_ompl.optimise.guesses import AHEAD, BACKWARDS, geodesic, guess_along
+from cbrrt_ompl.optimise.lattice_plan import STATE_LATTICE, lattice_plan
 from cbrrt_ompl.optimise.lead import begun_later, joined, lead_rows, split_at
 from cbrrt_ompl.optimise.objective import Objective
 from cbrrt_ompl.optimise.program import STEP
@@ -170,20 +171,39 @@ class Improver:
         self.adopt(trajectory, source)
         if trajectory.duration > 0.0 and not self.has_ended():
             guess = guess_from_trajectory(trajectory, self._scenario.robot.limits, f"{source}, optimised")
-            self.run([guess, *(geodesic_guesses(self._scenario) if others is None else others)])
+            guesses = [guess, *(geodesic_guesses(self._scenario) if others is None else others)]
+            self.run(guesses, self._guesses_from_lattice if source != STATE_LATTICE else None)
 
-    def run(self, guesses: list[Guess]) -> None:
+    def run(self, guesses: list[Guess], more: Callable[[], list[Guess]] | None = None) -> None:
         """Try guesses, the shortest first, and then refine the best of what came of them.
 
-        Where nothing came of any, they are tried again in twice as many intervals.
+        Where nothing came of any, further ones are asked for, and then all are tried again in twice as many intervals.
         """
-        guesses = sorted(guesses, key=lambda guess: guess.duration)
-        for guess in guesses:
-            self.try_guess(guess)
+        self._try_all(guesses)
+        if self._best_guess is None and more is not None and not self.has_ended():
+            further = more()
+            self._try_all(further)
+            guesses = guesses + further
         if self._best_guess is None:
-            for guess in guesses:
-                self.try_guess(refined(guess, is_kinematic=False))
+            self._try_all([refined(guess, is_kinematic=False) for guess in guesses])
         self.refine()
+
+    def _try_all(self, guesses: list[Guess]) -> None:
+        """Try guesses, the shortest first."""
+        for guess in sorted(guesses, key=lambda guess: guess.duration):
+            self.try_guess(guess)
+
+    def _guesses_from_lattice(self) -> list[Guess]:
+        """Guesses made of the plan over the state lattice, which is kept where it is better than the best."""
+        found = lattice_plan(self._scenario, self.has_ended, is_kinematic=self._transcription.is_kinematic)
+        if found is None:
+            return []
+        self.adopt(found, STATE_LATTICE)
+        limits = self._scenario.robot.limits
+        return [
+            guess_at_full_speed(found, limits, f"{STATE_LATTICE} at full speed"),
+            guess_from_trajectory(found, limits, f"{STATE_LATTICE}, optimised"),
+        ]
 
     def explore(self, guesses: Iterator[Guess]) -> None:
         """Try one guess after the other, and refine at once what is better than the best."""
@@ -265,6 +285,7 @@ def warm_up() -> None:
     scenario = Scenario(name="warm up", world=world, start=State(0.5, 0.5), goal=Goal(1.5, 0.5, tolerance=0.1))
     Improver(scenario, Objective(room=0.1), max_iterations=40).run(geodesic_guesses(scenario))
     clearances(np.array([scenario.start]), scenario)
+    lattice_plan(scenario, lambda: False)
 
 
 def _check_trajectory(trajectory: object, scenario: Scenario) -> None:
