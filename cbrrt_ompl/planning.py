@@ -19,11 +19,11 @@ from cbrrt_ompl.kernels.beside import compiled_beside
 from cbrrt_ompl.motion.model import ROOM, check_step, jumps, make_model
 from cbrrt_ompl.ompl_plugin.availability import check_ompl, has_ompl
 from cbrrt_ompl.optimise.anytime import further_guesses, robust_search
-from cbrrt_ompl.optimise.guess import Guess, guess_at_full_speed
+from cbrrt_ompl.optimise.guess import Guess
 from cbrrt_ompl.optimise.improving import Found, Improver, check_improvement, geodesic_guesses
 from cbrrt_ompl.optimise.improving import warm_up as warm_up_improvement
 from cbrrt_ompl.optimise.interior_point import iterate
-from cbrrt_ompl.optimise.lattice_plan import STATE_LATTICE, lattice_plan
+from cbrrt_ompl.optimise.lattice_plan import STATE_LATTICE, full_speed_guess, lattice_plan
 from cbrrt_ompl.optimise.objective import Objective
 from cbrrt_ompl.planners.bounded import BoundedTrees
 from cbrrt_ompl.planners.first_plan import FirstPlan
@@ -41,6 +41,9 @@ from cbrrt_ompl.trajectory.tree import Tree
 
 FIRST_SAMPLES = 5_000
 """Samples after which an anytime planner looks for another first plan than that of CB-RRT."""
+
+FEW_NODES = 10_000
+"""Nodes of a search over the lattice after which an anytime planner looks along the geodesics, and then goes on."""
 
 ANYTIME_ITERATIONS = 3000
 """Newton steps after which an anytime planner ends where neither they nor the time are given."""
@@ -225,19 +228,11 @@ def _plan_anytime(
     watch.start()
     improver.begin(watch.left(), watch.began)
     search.run(watch.should_stop, min(FIRST_SAMPLES, most))
-    others: list[Guess] | None = None
-    found: Trajectory | None = None
+    found, others = None, None
     if not search.has_reached_goal:
-        limits = scenario.robot.limits
-        found = lattice_plan(scenario, lambda: watch.should_stop(search.samples), is_kinematic=limits.is_first_order)
-        others = geodesic_guesses(scenario)
-        if found is not None:
-            others.append(guess_at_full_speed(found, limits, f"{STATE_LATTICE} at full speed"))
-        else:
-            improver.run(others)
-            others = []  # the geodesics have been tried
-            if improver.best is None:
-                search.run(watch.should_stop, most)
+        found, others = _without_samples(scenario, improver, lambda: watch.should_stop(search.samples))
+        if found is None and improver.best is None:
+            search.run(watch.should_stop, most)
     result = _result_of(search.first_plan(watch.elapsed()), planner, seed, watch.ended_by)
     improver.begin(budget, watch.began)
     if search.has_reached_goal:
@@ -247,6 +242,21 @@ def _plan_anytime(
     if improver.best is not None:
         improver.explore(further_guesses(scenario, search, first_seed, improver.has_ended))
     return _with_best(result, improver)
+
+
+def _without_samples(
+    scenario: Scenario, improver: Improver, should_stop: Callable[[], bool]
+) -> tuple[Trajectory | None, list[Guess]]:
+    """A plan over the lattice and the guesses to try beside it; or what the improver makes of the geodesics."""
+    limits = scenario.robot.limits
+    over_lattice = partial(lattice_plan, scenario, should_stop, is_kinematic=limits.is_first_order)
+    if not scenario.robot.footprint.is_round:
+        found = over_lattice(most_nodes=FEW_NODES)
+        if found is not None:
+            return found, [full_speed_guess(found, limits), *geodesic_guesses(scenario)]
+    improver.run(geodesic_guesses(scenario))
+    found = over_lattice() if improver.best is None else None
+    return found, [] if found is None else [full_speed_guess(found, limits)]
 
 
 def _seed_or_fresh(seed: int | None) -> int:

@@ -15,9 +15,9 @@ from cbrrt_ompl.checks import is_number
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.errors import Problem, SettingsError, TrajectoryError
 from cbrrt_ompl.optimise.clearance import clearances
-from cbrrt_ompl.optimise.guess import Guess, guess_at_full_speed, guess_from_trajectory, refined
+from cbrrt_ompl.optimise.guess import Guess, guess_from_trajectory, refined
 from cbrrt_ompl.optimise.guesses import AHEAD, BACKWARDS, geodesic, guess_along
-from cbrrt_ompl.optimise.lattice_plan import STATE_LATTICE, lattice_plan
+from cbrrt_ompl.optimise.lattice_plan import STATE_LATTICE, full_speed_guess, lattice_plan
 from cbrrt_ompl.optimise.lead import begun_later, joined, lead_rows, split_at
 from cbrrt_ompl.optimise.objective import Objective
 from cbrrt_ompl.optimise.program import STEP
@@ -201,7 +201,7 @@ class Improver:
         self.adopt(found, STATE_LATTICE)
         limits = self._scenario.robot.limits
         return [
-            guess_at_full_speed(found, limits, f"{STATE_LATTICE} at full speed"),
+            full_speed_guess(found, limits),
             guess_from_trajectory(found, limits, f"{STATE_LATTICE}, optimised"),
         ]
 

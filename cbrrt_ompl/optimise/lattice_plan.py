@@ -23,6 +23,7 @@ from cbrrt_ompl.motion.manoeuvres import FORWARD, REACHED, REVERSE, approach_com
 from cbrrt_ompl.motion.records import record_array
 from cbrrt_ompl.optimise.clearance import is_motion_free, least_clearance, unsafe_rows
 from cbrrt_ompl.optimise.geodesic import ways_to
+from cbrrt_ompl.optimise.guess import Guess, guess_at_full_speed
 from cbrrt_ompl.optimise.guesses import LEAST_ROOM, cell_side, cells_of
 from cbrrt_ompl.optimise.pose_lattice import (
     AHEAD,
@@ -100,7 +101,11 @@ class Corner(NamedTuple):
 
 
 def lattice_plan(
-    scenario: Scenario, should_stop: Callable[[], bool], *, is_kinematic: bool = False
+    scenario: Scenario,
+    should_stop: Callable[[], bool],
+    *,
+    is_kinematic: bool = False,
+    most_nodes: int = MOST_NODES,
 ) -> Trajectory | None:
     """A trajectory of straight ways and turns on the spot from the start into the goal region.
 
@@ -108,14 +113,15 @@ def lattice_plan(
         scenario: world, robot, start and goal.
         should_stop: asked every few milliseconds whether to give up.
         is_kinematic: whether the velocities jump.
+        most_nodes: of a search, at most.
 
     Returns:
-        The trajectory, free as the planners check it; None where the lattice has no path, or too many poses.
+        The trajectory, free as the planners check it; None where the lattice has no path, or none within so many nodes.
     """
     limits, step = scenario.robot.limits, scenario.planning.step
     braking = brake(*scenario.start, limits, step, MAX_STEPS)
     start = State(*braking[-1].tolist())
-    corners = lattice_path(scenario, Pose(*start[:3]), should_stop)
+    corners = lattice_path(scenario, Pose(*start[:3]), should_stop, most_nodes)
     if corners is None:
         return None
     aims = np.array(corners, dtype=float).reshape(-1, 4)
@@ -131,11 +137,16 @@ def lattice_plan(
     return Trajectory(t, *states.T, *commands.T, kinematic=is_kinematic, limits=limits)
 
 
-def lattice_path(scenario: Scenario, start: Pose, should_stop: Callable[[], bool]) -> list[Corner] | None:
+def full_speed_guess(trajectory: Trajectory, limits: Limits) -> Guess:
+    """The guess that a plan over the lattice is without its stops."""
+    return guess_at_full_speed(trajectory, limits, f"{STATE_LATTICE} at full speed")
+
+
+def lattice_path(
+    scenario: Scenario, start: Pose, should_stop: Callable[[], bool], most_nodes: int
+) -> list[Corner] | None:
     """Corners of a cheap path from a pose into the goal region, without that pose itself; None where there is none."""
-    searches = {
-        is_backwards: LatticeSearch(scenario, start, is_backwards=is_backwards) for is_backwards in (False, True)
-    }
+    searches = {way: LatticeSearch(scenario, start, most_nodes, is_backwards=way) for way in (False, True)}
     while searches:
         for is_backwards, search in list(searches.items()):
             if should_stop():
@@ -157,12 +168,15 @@ class LatticeSearch:
         fineness: how much finer the lattice is than the coarsest one.
     """
 
-    def __init__(self, scenario: Scenario, start: Pose, *, is_backwards: bool, fineness: int = 1) -> None:
+    def __init__(
+        self, scenario: Scenario, start: Pose, most_nodes: int, *, is_backwards: bool, fineness: int = 1
+    ) -> None:
         """Plant the roots.
 
         Args:
             scenario: world, robot and goal.
             start: where the robot rests.
+            most_nodes: nodes at most.
             is_backwards: whether time runs backwards: from the goal's centre to the start, by the opposites of moves.
             fineness: see above.
         """
@@ -181,9 +195,9 @@ class LatticeSearch:
         lattice["seconds"], lattice["begin"] = costs_of_moves(scenario.robot.limits)[:, order]
         lattice["goal"] = region_of(Goal(*start[:2], REACHED, start.theta, REACHED) if is_backwards else goal)
         lattice["to_go_cell"], self._to_go = ways_left(scenario, is_backwards=is_backwards)
-        self._nodes, self._search = record_array(MOST_NODES, NODE), record_array(1, SEARCH)
-        self._keys, self._heap = np.empty(MOST_NODES, dtype=np.float32), np.empty(MOST_NODES, dtype=np.int32)
-        self._table = np.zeros(1 << (2 * MOST_NODES - 1).bit_length(), dtype=np.int32)
+        self._nodes, self._search = record_array(most_nodes, NODE), record_array(1, SEARCH)
+        self._keys, self._heap = np.empty(most_nodes, dtype=np.float32), np.empty(most_nodes, dtype=np.int32)
+        self._table = np.zeros(1 << (2 * most_nodes - 1).bit_length(), dtype=np.int32)
         x, y, theta = (goal.x, goal.y, goal.theta) if is_backwards else start
         for heading in range(len(self._headings)) if theta is None else [nearest_heading(self._headings, theta)]:
             plant_root(
@@ -200,7 +214,8 @@ class LatticeSearch:
 
     def finer(self) -> LatticeSearch:
         """The same search over a lattice twice as fine, from its beginning."""
-        return LatticeSearch(self._scenario, self._start, is_backwards=self._is_backwards, fineness=2 * self.fineness)
+        most, way = len(self._nodes), self._is_backwards
+        return LatticeSearch(self._scenario, self._start, most, is_backwards=way, fineness=2 * self.fineness)
 
     def run(self, most: int) -> int:
         """Expand some nodes; see :func:`cbrrt_ompl.optimise.pose_lattice.grow_lattice`."""
@@ -324,10 +339,10 @@ def drive(
         dt: duration of a step [s].
         is_kinematic: whether the velocities jump.
     """
-    states = np.empty((256, 5))
-    states[0] = begin
-    count = 1
+    states: NDArray[np.float64] = np.empty((256, 5))
     x, y, theta, v, omega = begin[0], begin[1], begin[2], begin[3], begin[4]
+    states[0, 0], states[0, 1], states[0, 2], states[0, 3], states[0, 4] = x, y, theta, v, omega
+    count = 1
     for i in range(len(aims)):
         aim, is_reverse = (aims[i, 0], aims[i, 1], aims[i, 2]), aims[i, 3] == BACK
         left = most_steps(REVERSE if is_reverse else FORWARD, math.hypot(aim[0] - x, aim[1] - y), limits, dt)
@@ -341,9 +356,7 @@ def drive(
             else:
                 x, y, theta, v, omega = dynamic_step(x, y, theta, v, omega, command, limits, dt)
             if count == len(states):
-                longer = np.empty((2 * count, 5))
-                longer[:count] = states
-                states = longer
+                states = np.concatenate((states, np.empty_like(states)))
             row = states[count]
             row[0], row[1], row[2], row[3], row[4] = x, y, theta, v, omega
             count += 1

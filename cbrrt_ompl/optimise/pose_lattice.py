@@ -172,7 +172,7 @@ def plant_root(
     """Add a pose (x, y, heading in the ring) to begin from, if it is free; see :func:`grow_lattice`."""
     lattice, search = lattices[0], searches[0]
     x, y, heading = pose
-    distance, _ = clearance(scene, x, y, headings[heading], lattice.room + MOST_STRIDE * lattice.step)
+    distance = clearance_at_pose(scene, lattice, x, y, headings[heading])
     if distance <= lattice.room:
         return
     new = add_node(nodes, search, -1, x, y, headings[heading], 0.0, distance, heading, NO_MOVE)
@@ -236,6 +236,12 @@ def bound_of(x: float, y: float, lattice: Record, to_go: NDArray[np.float32]) ->
 
 
 @inner_kernel
+def clearance_at_pose(scene: Scene, lattice: Record, x: float, y: float, theta: float) -> float:
+    """Distance of the footprint from everything, or a bound below it that allows for the longest moves [m]."""
+    return float(clearance(scene, x, y, theta, lattice.room + MOST_STRIDE * lattice.step)[0])
+
+
+@inner_kernel
 def free_after(scene: Scene, lattice: Record, node: Record, length: float, turn: float) -> float:
     """Clearance after a straight way [m] or a turn [rad] from a node; 0 where that is not free.
 
@@ -243,8 +249,7 @@ def free_after(scene: Scene, lattice: Record, node: Record, length: float, turn:
     motion check does (:mod:`cbrrt_ompl.collision.motion_check`).
     """
     c, s = math.cos(node.theta), math.sin(node.theta)
-    enough = lattice.room + MOST_STRIDE * lattice.step
-    at_end, _ = clearance(scene, node.x + length * c, node.y + length * s, node.theta + turn, enough)
+    at_end = clearance_at_pose(scene, lattice, node.x + length * c, node.y + length * s, node.theta + turn)
     if at_end <= lattice.room:
         return 0.0
     way = abs(length) + scene.frame[0].reach * abs(turn)
@@ -252,7 +257,7 @@ def free_after(scene: Scene, lattice: Record, node: Record, length: float, turn:
     while done < way - (at_end - lattice.room):
         part = done / way
         x, y = node.x + part * length * c, node.y + part * length * s
-        distance, _ = clearance(scene, x, y, node.theta + part * turn, enough)
+        distance = clearance_at_pose(scene, lattice, x, y, node.theta + part * turn)
         if distance <= lattice.room:
             return 0.0
         done += max(distance - lattice.room, MOTION_RESOLUTION)
