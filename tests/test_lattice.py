@@ -109,6 +109,12 @@ def test_a_moving_robot_brakes_first() -> None:
     assert trajectory.states[0].tolist() == [1.0, 2.0, 1.0, 0.5, -0.5]
 
 
+def test_a_moving_robot_whose_velocities_jump_does_not_brake() -> None:
+    """The rows of its braking were integrated as if they did not jump."""
+    trajectory = found(replace(DOORS, start=State(1.0, 2.0, 1.0, 0.5, -0.5)), is_kinematic=True)
+    assert trajectory.v_command[0] in (0.0, -3.0, 3.0)
+
+
 def test_clearance_and_braking_are_kept() -> None:
     scenario = replace(DOORS, planning=PlanningSettings(clearance=0.03, brake_safe=True))
     found(scenario)

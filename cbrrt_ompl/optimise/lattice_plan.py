@@ -64,7 +64,7 @@ MOST_NODES = 400_000
 """Nodes of a search at most: 24 MB."""
 
 GREED = 2.0
-"""Weight of the bound of what is left: a path may take so many times as long as the shortest one of the lattice."""
+"""Weight of the bound of what is left: a path may cost about so many times as much as the cheapest one."""
 
 BEGIN = 0.3
 """What a move costs to begin, in terms of the time that it loses to a start and a stop at full acceleration."""
@@ -119,7 +119,7 @@ def lattice_plan(
         The trajectory, free as the planners check it; None where the lattice has no path, or none within so many nodes.
     """
     limits, step = scenario.robot.limits, scenario.planning.step
-    braking = brake(*scenario.start, limits, step, MAX_STEPS)
+    braking = np.array([scenario.start]) if is_kinematic else brake(*scenario.start, limits, step, MAX_STEPS)
     start = State(*braking[-1].tolist())
     corners = lattice_path(scenario, Pose(*start[:3]), should_stop, most_nodes)
     if corners is None:
