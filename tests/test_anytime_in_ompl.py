@@ -75,7 +75,7 @@ def test_the_path_length_is_honoured() -> None:
 
 @pytest.mark.parametrize("threshold", [100.0, 0.0])
 def test_a_solution_that_meets_the_threshold_ends_it(threshold: float) -> None:
-    setup, heard = solved(lambda si: DurationObjective(si, threshold), seconds=0.5)
+    setup, heard = solved(lambda si: DurationObjective(si, threshold), seconds=2.0)
     assert (len(heard) == 1) == (threshold > 0.0)
     assert setup.getProblemDefinition().hasOptimizedSolution() == (threshold > 0.0)
 

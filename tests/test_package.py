@@ -79,7 +79,9 @@ sys.exit(7)"""
 @pytest.mark.parametrize("first", ["import cbrrt_ompl", "import ompl\nimport cbrrt_ompl", ""])
 def test_ompl_may_be_imported_before_the_first_plan_and_before_the_package(first: str, module: str) -> None:
     """OMPL's modules loaded a second libompl unless our binding came first, and the process died at its end."""
-    code = f"""{first}
+    code = f"""import os
+os.environ["CBRRT_OMPL_COMPILED_METHODS"] = "1"
+{first}
 from ompl import {module}
 import sys, cbrrt_ompl
 setup = cbrrt_ompl.make_setup(cbrrt_ompl.load_scenario("paper_case1"), "rrt")

@@ -28,6 +28,15 @@ EXPECTED_FRACTION = 0.6
 """What an optimisation makes of the duration of a plan: its intervals are to have the usual duration then."""
 
 
+class Duals(NamedTuple):
+    """What a solution tells of its constraints: a like problem is solved from there in a few steps (a warm start)."""
+
+    multipliers: NDArray[np.float64]
+    """Of the inequalities of each state, shape (N + 1, ROWS)."""
+    costates: NDArray[np.float64]
+    """Multipliers of the dynamics that end at each state, shape (N + 1, STATES)."""
+
+
 class Guess(NamedTuple):
     """States and controls for the solver to start from."""
 
@@ -38,6 +47,8 @@ class Guess(NamedTuple):
     """Rows of (a, alpha), shape (N, 2); in a solution for a kinematic robot the velocities (v, omega)."""
     source: str
     """Where it comes from."""
+    duals: Duals | None = None
+    """Where it is a solution, or one whose intervals were cut: what is known of its constraints."""
 
     @property
     def duration(self) -> float:
@@ -123,7 +134,20 @@ def split(guess: Guess, chosen: NDArray[np.bool_], *, is_kinematic: bool) -> Gue
     states = np.where(is_second[:, None], middle[index], before[index])
     states[:, STEP] = h[index]
     last = np.append(after[-1, :STEP], states[-1, STEP])
-    return Guess(np.vstack([states, last]), a[index], guess.source)
+    duals = None if guess.duals is None else _split_duals(guess.duals, chosen, index, is_second)
+    return Guess(np.vstack([states, last]), a[index], guess.source, duals)
+
+
+def _split_duals(
+    duals: Duals, chosen: NDArray[np.bool_], index: NDArray[np.int64], is_second: NDArray[np.bool_]
+) -> Duals:
+    """Those of :func:`split`: what a constraint weighs is shared by both halves of an interval."""
+    node, is_halved = np.append(index, len(chosen)), np.append(chosen[index], False)
+    costates = duals.costates[node]
+    costates[:-1][is_second] = 0.5 * (costates[:-1] + duals.costates[index + 1])[is_second]
+    costates[is_halved, STEP] *= 2.0
+    node[:-1][is_second & (index == 0)] = 1  # the start has other inequalities than all states after it
+    return Duals(duals.multipliers[node] * np.where(is_halved, 0.5, 1.0)[:, None], costates)
 
 
 def smoothed(values: NDArray[np.float64], width: int = 5) -> NDArray[np.float64]:

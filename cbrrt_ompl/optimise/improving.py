@@ -228,7 +228,7 @@ class Improver:
             self._callback(self.history[-1])
         return True
 
-    def try_guess(self, guess: Guess, last_barrier: float = ROUGH, *, is_warm: bool = False) -> bool:
+    def try_guess(self, guess: Guess, last_barrier: float = ROUGH) -> bool:
         """Solve for a guess and keep what comes of it, where it is better than the best; says whether it is."""
         if self.has_ended():
             return False
@@ -241,7 +241,7 @@ class Improver:
             return 0 if self.has_ended() else min(ITERATIONS_A_GUESS - done, self._left())
 
         found = solve_and_repair(
-            self._transcription, guess, last_barrier, may_iterate, most_cost=self._best_cost, is_warm=is_warm
+            self._transcription, guess, last_barrier, may_iterate, most_cost=self._best_cost
         )
         return found is not None and self.adopt(found.trajectory, guess.source, found.guess)
 
@@ -250,7 +250,7 @@ class Improver:
         if self._best_guess is None:
             return False
         guess = refined(self._best_guess, is_kinematic=self._transcription.is_kinematic)
-        return self.try_guess(guess._replace(source=f"{guess.source}, refined"), FINE, is_warm=True)
+        return self.try_guess(guess._replace(source=f"{guess.source}, refined"), FINE)
 
     def elapsed(self) -> float:
         """Time since the beginning [s]."""

@@ -46,6 +46,7 @@ PROGRESS = np.dtype(
         ("barrier", np.float64),  # mu
         ("last_barrier", np.float64),  # mu at which to end
         ("least_slack", np.float64),  # what a slack starts with at least
+        ("is_warm", np.bool_),  # whether the stages hold multipliers and costates of a like problem's solution
         ("penalty", np.float64),  # nu
         ("merits", np.float64, (MEMORY,)),  # of the last iterates under this mu and nu
         ("merits_barrier", np.float64),  # mu and nu of those
@@ -75,6 +76,9 @@ LARGEST_STATIONARITY = 1e-2
 
 BARRIER_FACTOR, BARRIER_POWER = 0.2, 1.5
 """mu becomes the smaller of 0.2 mu and mu^1.5 when its problem is solved to 10 mu."""
+
+LARGEST_IMBALANCE = 10.0
+"""How far s m may be from mu at a warm start."""
 
 HALVINGS = 7
 """Times that a line search shortens a step before it gives up."""
@@ -110,14 +114,18 @@ def iterate(
 
 @inner_kernel
 def enter_slacks(problem: Record, distances: NDArray[np.float32], stages: Records, progress: Record) -> None:
-    """Set slacks and multipliers for the states and controls in the stages."""
+    """Set slacks and multipliers for the states and controls in the stages; known multipliers as far as s m allows."""
     last = len(stages) - 1
     for k in range(last + 1):
         stage = stages[k]
         evaluate_rows(problem, distances, stage, k == 0, k == last, stage.state, stage.control, stage.values)
         for i in range(stage.row_count):
-            stage.slacks[i] = max(stage.values[i], progress.least_slack)
-            stage.multipliers[i] = progress.barrier / stage.slacks[i]
+            slack = max(stage.values[i], progress.least_slack)
+            multiplier = progress.barrier / slack
+            if progress.is_warm:
+                known = stage.multipliers[i]
+                multiplier = min(max(known, multiplier / LARGEST_IMBALANCE), multiplier * LARGEST_IMBALANCE)
+            stage.slacks[i], stage.multipliers[i] = slack, multiplier
     progress.status = SOLVE_RUNNING
 
 

@@ -27,9 +27,6 @@ ITERATIONS_A_SOLUTION = 200
 SOLVED_TO = 1e-3
 """Violation of a constraint up to which a solution is worth rolling out."""
 
-FIRST_BARRIER, WARM_BARRIER = 0.03, 1e-3
-"""Barrier parameters to start with: from a guess, and from a solution with other margins."""
-
 DEEPEST = 0.01
 """How much nearer than at both of its nodes an interval may come to something before it is cut in two [m]: larger
 margins at its nodes would close narrow passages."""
@@ -67,7 +64,6 @@ def solve_and_repair(
     may_iterate: Callable[[int], int],
     *,
     most_cost: float = math.inf,
-    is_warm: bool = False,
 ) -> Improvement | None:
     """Make a trajectory of a guess.
 
@@ -77,7 +73,6 @@ def solve_and_repair(
         last_barrier: how precisely to solve, see :mod:`cbrrt_ompl.optimise.interior_point`.
         may_iterate: takes the Newton steps so far and says how many more there may be.
         most_cost: a solution that costs as much is of no use.
-        is_warm: whether the guess is a solution already.
 
     Returns:
         A trajectory that is free, within all limits and in the goal region; None where the guess leads to none.
@@ -85,15 +80,15 @@ def solve_and_repair(
     scenario = transcription.scenario
     margins: NDArray[np.float64] = np.full(len(guess.states), transcription.margin)
     caps = np.ones(len(guess.states))
-    barrier, spent = WARM_BARRIER if is_warm else FIRST_BARRIER, 0
+    spent = 0
     for _ in range(ROUNDS):
         solution = transcription.solve(
-            guess, margins, caps, barrier, last_barrier, partial(_allowed, may_iterate, spent)
+            guess, margins, caps, last_barrier, partial(_allowed, may_iterate, spent)
         )
         spent += solution.iterations
         if not (solution.iterations and solution.infeasibility < SOLVED_TO and solution.cost < most_cost):
             return None
-        guess, barrier = solution.guess, WARM_BARRIER
+        guess = solution.guess
         trajectory, rows = transcription.trajectory(guess), transcription.rows(guess)
         if scenario.goal.violations(State(*trajectory.states[-1].tolist())):
             return None

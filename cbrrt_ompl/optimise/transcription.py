@@ -15,7 +15,7 @@ from cbrrt_ompl.motion.records import Record, record_array
 from cbrrt_ompl.optimise.clearance import least_clearance
 from cbrrt_ompl.optimise.cover import cover
 from cbrrt_ompl.optimise.field import field_of
-from cbrrt_ompl.optimise.guess import Guess
+from cbrrt_ompl.optimise.guess import Duals, Guess
 from cbrrt_ompl.optimise.inequalities import lay_out_rows
 from cbrrt_ompl.optimise.interior_point import PROGRESS, SOLVE_RUNNING, iterate
 from cbrrt_ompl.optimise.objective import Objective
@@ -37,11 +37,11 @@ SPARE_FRACTION, SPARE_TOLERANCE = 0.1, 0.002
 REGULARISATION = 2e-3
 """Smoothness that the solver adds to every objective: it picks one of many motions that take the same time."""
 
-WARM = 0.01
-"""Barrier parameters below this are for guesses that are nearly solutions."""
+FIRST_BARRIER, LEAST_SLACK = 0.03, 0.05
+"""Barrier parameter to start with from a mere guess, and what a slack starts with at least."""
 
-LEAST_SLACK, LEAST_WARM_SLACK = 0.05, 1e-3
-"""What a slack starts with at least: from a mere guess, and from a solution of a like problem."""
+LEAST_WARM_SLACK = 10.0
+"""The same in terms of the barrier parameter, from a solution of a like problem."""
 
 SHORTEST_STEP = 1e-3
 """Least duration of an interval [s]."""
@@ -93,18 +93,16 @@ class Transcription:
         guess: Guess,
         margins: NDArray[np.float64],
         speed_caps: NDArray[np.float64],
-        barrier: float,
         last_barrier: float,
         may_iterate: Callable[[int], int],
     ) -> Solution:
         """Improve a guess.
 
         Args:
-            guess: states and controls.
+            guess: states and controls; one that knows its duals is taken for nearly a solution.
             margins: distance to keep at each state, shape (N + 1,) [m].
             speed_caps: fraction of the velocity limits to use at each state, shape (N + 1,).
-            barrier: first value of the barrier parameter, see :mod:`cbrrt_ompl.optimise.interior_point`.
-            last_barrier: its last value.
+            last_barrier: last value of the barrier parameter, see :mod:`cbrrt_ompl.optimise.interior_point`.
             may_iterate: takes the number of Newton steps so far and says how many more there may be.
         """
         stages, multiples = record_array(len(guess.states), STAGE), guess.multiples
@@ -115,18 +113,23 @@ class Transcription:
         stages["control"][:-1] = guess.states[1:, V : OMEGA + 1] if self.is_kinematic else guess.controls
         stages["margin"], stages["speed_cap"] = margins, speed_caps
         progress = record_array(1, PROGRESS)[0]
-        progress["barrier"], progress["last_barrier"], progress["penalty"] = barrier, last_barrier, 1.0
+        progress["barrier"], progress["least_slack"] = FIRST_BARRIER, LEAST_SLACK
+        progress["last_barrier"], progress["penalty"] = last_barrier, 1.0
+        if guess.duals is not None:
+            progress["barrier"], progress["least_slack"] = last_barrier, LEAST_WARM_SLACK * last_barrier
+            stages["multipliers"], stages["costate"] = guess.duals
+            progress["is_warm"] = True
         turns = round((guess.states[-1, THETA] - self._goal_theta) / math.tau)
         problem, distances = self._problem.copy(), self._distances
         problem["goal_theta"] = self._goal_theta + turns * math.tau  # the solver knows no wrapped angles
-        progress["least_slack"] = LEAST_SLACK if barrier > WARM else LEAST_WARM_SLACK
         lay_out_rows(problem, stages)
         while progress["status"] <= SOLVE_RUNNING:
             allowed = may_iterate(int(progress["iterations"]))
             if allowed <= 0:
                 break
             iterate(problem, distances, stages, progress, min(allowed, ITERATIONS_AT_ONCE))
-        found = Guess(stages["state"].copy(), stages["control"][:-1].copy(), guess.source)
+        duals = Duals(stages["multipliers"].copy(), stages["costate"].copy())
+        found = Guess(stages["state"].copy(), stages["control"][:-1].copy(), guess.source, duals)
         cost = float(progress["cost"]) / (1.0 + REGULARISATION)
         return Solution(found, float(progress["infeasibility"]), cost, int(progress["iterations"]))
 
