@@ -32,7 +32,7 @@ def test_a_drive_with_improved_plans_is_shorter_safe_and_repeats_itself(office: 
 
 def test_an_improvement_that_was_cut_short_goes_on_in_the_next_cycles(office: Scenario) -> None:
     """Until it comes to its end: then no cycle takes the plan up again."""
-    settings = DriveSettings(sensor_range=30.0, max_samples=2000, max_iterations=30)
+    settings = DriveSettings(sensor_range=30.0, max_samples=2000, max_iterations=14)
     result = drive(office, [], settings, seed=1)
     statuses = [replan.status for replan in result.replans]
     assert statuses[0] == "solved" and set(statuses[1:]) == {"improved"}

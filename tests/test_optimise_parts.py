@@ -145,7 +145,7 @@ def solved(scenario: Scenario, objective: Objective) -> float:
     assert path is not None
     guess = guess_along(path, scenario, AHEAD, "ahead")
     n = len(guess.states)
-    solution = transcription.solve(guess, np.zeros(n), np.ones(n), 0.1, 1e-7, lambda done: 300 - done)
+    solution = transcription.solve(guess, np.zeros(n), np.ones(n), 1e-7, lambda done: 300 - done)
     assert solution.infeasibility < 1e-5
     return transcription.trajectory(solution.guess).duration
 
@@ -196,7 +196,7 @@ def solution_in_the_open(*, is_kinematic: bool) -> tuple[Transcription, Guess]:
     transcription = Transcription(scenario, Objective(), is_kinematic=is_kinematic)
     guess = guess_along(path, scenario, AHEAD, "ahead")
     n = len(guess.states)
-    return transcription, transcription.solve(guess, np.zeros(n), np.ones(n), 0.1, 1e-4, lambda done: 200 - done).guess
+    return transcription, transcription.solve(guess, np.zeros(n), np.ones(n), 1e-4, lambda done: 200 - done).guess
 
 
 @pytest.mark.parametrize("is_kinematic", [False, True], ids=["dynamic", "kinematic"])
@@ -212,13 +212,36 @@ def test_intervals_of_different_lengths_are_solved_and_rolled_out_to_even_rows(i
     assert same.duration == pytest.approx(before.duration)
     assert same.states[-1] == pytest.approx(before.states[-1], abs=1e-5)
     n = len(solution.states)
-    again = transcription.solve(solution, np.zeros(n), np.ones(n), 1e-3, 1e-5, lambda done: 100 - done)
+    again = transcription.solve(solution, np.zeros(n), np.ones(n), 1e-5, lambda done: 100 - done)
     assert again.infeasibility < 1e-5
     np.testing.assert_array_equal(again.guess.multiples, solution.multiples)
     trajectory = transcription.trajectory(again.guess)
     assert np.diff(trajectory.t) == pytest.approx(trajectory.t[1])
     ends = trajectory.states[np.append(0, np.cumsum(transcription.rows(again.guess))), :3]
     assert ends == pytest.approx(again.guess.states[:, :3], abs=2e-3)
+
+
+def test_a_solution_is_solved_again_in_a_few_steps() -> None:
+    """With larger margins it took as many steps as the first time: its multipliers were forgotten."""
+    wall = World(Bounds((0.0, 0.0), (10.0, 4.0)), [Box((3.0, 0.0), (3.5, 2.5)), Box((6.0, 1.5), (6.5, 4.0))])
+    scenario = Scenario(name="wall", world=wall, start=State(1.0, 1.0), goal=Goal(9.0, 3.0, tolerance=0.1))
+    path = geodesic(scenario)
+    assert path is not None
+    transcription = Transcription(scenario, Objective())
+
+    def steps(guess: Guess, margin: float) -> tuple[int, Guess]:
+        n = len(guess.states)
+        solution = transcription.solve(guess, np.full(n, margin), np.ones(n), 1e-4, lambda done: 200 - done)
+        assert solution.infeasibility < 1e-5
+        return solution.iterations, solution.guess
+
+    first, solution = steps(guess_along(path, scenario, AHEAD, "ahead"), 0.01)
+    again, _ = steps(solution, 0.012)
+    forgotten, _ = steps(solution._replace(duals=None), 0.012)
+    assert again <= 5
+    assert again < 0.5 * min(first, forgotten)
+    finer, _ = steps(refined(solution, is_kinematic=False), 0.01)
+    assert finer <= 20
 
 
 @pytest.mark.parametrize("is_kinematic", [False, True], ids=["dynamic", "kinematic"])

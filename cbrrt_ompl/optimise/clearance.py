@@ -19,6 +19,10 @@ from cbrrt_ompl.problem.settings import MAX_STEPS
 from cbrrt_ompl.scenario.scenario import Scenario
 
 
+FAR = 0.1
+"""Clearance beyond the least one from which on that by the distance field will do [m]."""
+
+
 def least_clearance(scenario: Scenario) -> float:
     """Distance that the motions of a scenario keep from everything [m]."""
     return motion_room(scenario.planning.clearance)
@@ -51,9 +55,15 @@ def clearances(states: NDArray[np.float64], scenario: Scenario) -> NDArray[np.fl
 
 
 def signed_clearances(states: NDArray[np.float64], scenario: Scenario) -> NDArray[np.float64]:
-    """:func:`clearances`, but where the footprint touches something, about how deep, by the distance field [m]."""
-    found, by_field = clearances(states, scenario), disc_distances(states, scenario).min(axis=1)
-    return np.where(found > 0.0, found, np.minimum(by_field, 0.0))
+    """:func:`clearances`, but by the distance field where the footprint touches something or is far from all [m].
+
+    Then it is about how deep, or about how far.
+    """
+    found = disc_distances(states, scenario).min(axis=1)
+    is_near = found < least_clearance(scenario) + FAR
+    exact = clearances(states[is_near], scenario)
+    found[is_near] = np.where(exact > 0.0, exact, np.minimum(found[is_near], 0.0))
+    return found
 
 
 def unsafe_rows(states: NDArray[np.float64], scenario: Scenario) -> NDArray[np.bool_]:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Sequence
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.optimise.clearance import least_clearance
 from cbrrt_ompl.optimise.field import field_of
 from cbrrt_ompl.optimise.geodesic import cell_costs, shortest_path
@@ -112,8 +115,7 @@ def cells_of(scenario: Scenario, cell: float, inner: float, outer: float) -> tup
     bounds = scenario.world.bounds
     (width, height), (x_min, y_min) = bounds.size, bounds.min
     columns, rows = math.ceil(width / cell), math.ceil(height / cell)
-    costs = cell_costs(*field_of(scenario.world), bounds.min, cell, (rows, columns), inner, outer)
-    costs = costs.reshape(rows, columns)
+    costs = _known_costs(scenario.world, cell, (rows, columns), inner, outer).reshape(rows, columns).copy()
     ends, reach = [], math.ceil(outer / cell)
     for x, y in ((scenario.start.x, scenario.start.y), (scenario.goal.x, scenario.goal.y)):
         i, j = min(int((x - x_min) / cell), columns - 1), min(int((y - y_min) / cell), rows - 1)
@@ -121,6 +123,20 @@ def cells_of(scenario: Scenario, cell: float, inner: float, outer: float) -> tup
         around[np.isinf(around)] = 10.0  # the ends are free, however the grid sees them
         ends.append(j * columns + i)
     return costs, ends
+
+
+_costs: WeakKeyDictionary[World, tuple[tuple[float, ...], NDArray[np.float32]]] = WeakKeyDictionary()
+_lock = threading.Lock()
+
+
+def _known_costs(world: World, cell: float, shape: tuple[int, int], inner: float, outer: float) -> NDArray[np.float32]:
+    """:func:`cbrrt_ompl.optimise.geodesic.cell_costs` of a world, kept for the robot that asked last."""
+    with _lock:
+        known, costs = _costs.get(world, ((), np.empty(0, dtype=np.float32)))
+        if known != (cell, inner, outer):
+            costs = cell_costs(*field_of(world), world.bounds.min, cell, shape, inner, outer)
+            _costs[world] = (cell, inner, outer), costs
+        return costs
 
 
 def guess_along(path: NDArray[np.float64], scenario: Scenario, gear: int, source: str) -> Guess:
