@@ -18,7 +18,6 @@ from cbrrt_ompl.optimise.field import distance_at, field_of
 from cbrrt_ompl.problem.settings import MAX_STEPS
 from cbrrt_ompl.scenario.scenario import Scenario
 
-
 FAR = 0.1
 """Clearance beyond the least one from which on that by the distance field will do [m]."""
 

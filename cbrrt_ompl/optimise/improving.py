@@ -240,9 +240,7 @@ class Improver:
             self.iterations = before + done
             return 0 if self.has_ended() else min(ITERATIONS_A_GUESS - done, self._left())
 
-        found = solve_and_repair(
-            self._transcription, guess, last_barrier, may_iterate, most_cost=self._best_cost
-        )
+        found = solve_and_repair(self._transcription, guess, last_barrier, may_iterate, most_cost=self._best_cost)
         return found is not None and self.adopt(found.trajectory, guess.source, found.guess)
 
     def refine(self) -> bool:

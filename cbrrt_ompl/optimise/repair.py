@@ -21,8 +21,12 @@ from cbrrt_ompl.trajectory.trajectory import Trajectory
 ROUNDS = 10
 """Solutions that are tried for one guess."""
 
-ITERATIONS_A_SOLUTION = 200
-"""Newton steps of each of them at most."""
+ITERATIONS_A_SOLUTION, WARM_ITERATIONS = 200, 100
+"""Newton steps of each of them at most, and of one from the multipliers of the one before: most take a dozen, and where
+one does not converge, it is begun again without them."""
+
+SPLIT_BARRIER = 1e-3
+"""Barrier parameter to go on with where intervals were cut: the new states may be deep in something."""
 
 SOLVED_TO = 1e-3
 """Violation of a constraint up to which a solution is worth rolling out."""
@@ -80,15 +84,20 @@ def solve_and_repair(
     scenario = transcription.scenario
     margins: NDArray[np.float64] = np.full(len(guess.states), transcription.margin)
     caps = np.ones(len(guess.states))
-    spent = 0
+    spent, barrier = 0, last_barrier
     for _ in range(ROUNDS):
+        most = ITERATIONS_A_SOLUTION if guess.duals is None else WARM_ITERATIONS
         solution = transcription.solve(
-            guess, margins, caps, last_barrier, partial(_allowed, may_iterate, spent)
+            guess, margins, caps, last_barrier, partial(_allowed, may_iterate, spent, most), barrier
         )
         spent += solution.iterations
-        if not (solution.iterations and solution.infeasibility < SOLVED_TO and solution.cost < most_cost):
+        is_solved = solution.infeasibility < SOLVED_TO
+        if guess.duals is not None and not is_solved:
+            guess = guess._replace(duals=None)
+            continue
+        if not (solution.iterations and is_solved and solution.cost < most_cost):
             return None
-        guess = solution.guess
+        guess, barrier = solution.guess, last_barrier
         trajectory, rows = transcription.trajectory(guess), transcription.rows(guess)
         if scenario.goal.violations(State(*trajectory.states[-1].tolist())):
             return None
@@ -111,15 +120,16 @@ def solve_and_repair(
         is_deep &= len(rows) < MOST_INTERVALS
         margins = margins + at_nodes(np.where(is_deep, 0.0, lack))
         if is_deep.any():
+            barrier = max(last_barrier, SPLIT_BARRIER)
             guess = split(guess, is_deep, is_kinematic=transcription.is_kinematic)
             kept = np.append(np.repeat(np.arange(len(rows)), 1 + is_deep), len(rows))
             margins, caps = margins[kept], caps[kept]
     return None
 
 
-def _allowed(may_iterate: Callable[[int], int], spent: int, done: int) -> int:
-    """Newton steps that are left after some of this solution and those of the ones before."""
-    return min(may_iterate(spent + done), ITERATIONS_A_SOLUTION - done)
+def _allowed(may_iterate: Callable[[int], int], spent: int, most: int, done: int) -> int:
+    """Newton steps that are left after some of this solution, and those of the ones before."""
+    return min(may_iterate(spent + done), most - done)
 
 
 def ways_of(

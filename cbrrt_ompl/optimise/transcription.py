@@ -40,8 +40,8 @@ REGULARISATION = 2e-3
 FIRST_BARRIER, LEAST_SLACK = 0.002, 0.05
 """Barrier parameter to start with from a mere guess, and what a slack starts with at least.
 
-Each of some thousand inequalities holds the motion off by about the parameter in seconds: from 0.03 on, the solver first
-made a motion of half a minute twice as long, and took twice as many steps to come back.
+Each of some thousand inequalities costs about the parameter in seconds: from 0.03 on, the solver first made a motion of
+half a minute half as long again, and took as many steps to come back.
 """
 
 LEAST_WARM_SLACK = 10.0
@@ -99,6 +99,7 @@ class Transcription:
         speed_caps: NDArray[np.float64],
         last_barrier: float,
         may_iterate: Callable[[int], int],
+        barrier: float | None = None,
     ) -> Solution:
         """Improve a guess.
 
@@ -108,6 +109,7 @@ class Transcription:
             speed_caps: fraction of the velocity limits to use at each state, shape (N + 1,).
             last_barrier: last value of the barrier parameter, see :mod:`cbrrt_ompl.optimise.interior_point`.
             may_iterate: takes the number of Newton steps so far and says how many more there may be.
+            barrier: its first value for a guess that knows its duals; the last one if not given.
         """
         stages, multiples = record_array(len(guess.states), STAGE), guess.multiples
         stages["state"] = guess.states
@@ -120,7 +122,8 @@ class Transcription:
         progress["barrier"], progress["least_slack"] = FIRST_BARRIER, LEAST_SLACK
         progress["last_barrier"], progress["penalty"] = last_barrier, 1.0
         if guess.duals is not None:
-            progress["barrier"], progress["least_slack"] = last_barrier, LEAST_WARM_SLACK * last_barrier
+            barrier = barrier or last_barrier
+            progress["barrier"], progress["least_slack"] = barrier, LEAST_WARM_SLACK * barrier
             stages["multipliers"], stages["costate"] = guess.duals
             progress["is_warm"] = True
         turns = round((guess.states[-1, THETA] - self._goal_theta) / math.tau)
