@@ -147,7 +147,7 @@ def grow_lattice(
             distance = free_after(scene, lattice, node, length, turn)
             if distance <= 0.0:
                 continue
-            new = add_node(nodes, search, here, x, y, headings[heading], cost, distance, heading, move)
+            new = add_pose(nodes, search, here, x, y, headings[heading], cost, distance, heading, move)
             nodes[new].key = key
             table[slot] = new + 1
             if in_goal(lattice.goal, x, y, headings[heading], 0.0, 0.0):
@@ -175,14 +175,14 @@ def plant_root(
     distance = clearance_at_pose(scene, lattice, x, y, headings[heading])
     if distance <= lattice.room:
         return
-    new = add_node(nodes, search, -1, x, y, headings[heading], 0.0, distance, heading, NO_MOVE)
+    new = add_pose(nodes, search, -1, x, y, headings[heading], 0.0, distance, heading, NO_MOVE)
     nodes[new].key = key_of(x, y, heading, 1, lattice, len(headings))
     table[slot_of(nodes[new].key, nodes, table)] = new + 1
     search.queued = heap_push(keys, heap, search.queued, np.float32(0.0), new)
 
 
 @inner_kernel
-def add_node(
+def add_pose(
     nodes: Records,
     search: Record,
     parent: int,
@@ -280,7 +280,7 @@ def aim_at_goal(scene: Scene, lattice: Record, here: int, nodes: Records, search
         if last >= 0 and distance >= 1e-9:
             length = distance if gear == AHEAD else -distance
             room = free_after(scene, lattice, nodes[last], length, 0.0)
-            last = add_node(nodes, search, last, goal.x, goal.y, theta, 0.0, room, 0, gear) if room > 0.0 else -1
+            last = add_pose(nodes, search, last, goal.x, goal.y, theta, 0.0, room, 0, gear) if room > 0.0 else -1
         if last >= 0 and goal.heading_tolerance < math.inf:
             last = add_turn(scene, lattice, last, goal.theta, nodes, search)
         if last >= 0:
@@ -302,4 +302,4 @@ def add_turn(scene: Scene, lattice: Record, here: int, theta: float, nodes: Reco
     room = free_after(scene, lattice, nodes[here], 0.0, turn)
     if room <= 0.0:
         return -1
-    return add_node(nodes, search, here, nodes[here].x, nodes[here].y, theta, 0.0, room, 0, move)
+    return add_pose(nodes, search, here, nodes[here].x, nodes[here].y, theta, 0.0, room, 0, move)
