@@ -115,7 +115,7 @@ def grow_lattice(
         here = heap[0]
         search.queued = heap_pop(keys, heap, search.queued)
         node = nodes[here]
-        if table[slot_of(node.key, nodes, table)] != here + 1:
+        if table[slot_of_cell(node.key, nodes, table)] != here + 1:
             continue  # a cheaper one is alike
         search.waited += 1
         if search.waited * lattice.step >= math.hypot(lattice.goal.x - node.x, lattice.goal.y - node.y):
@@ -141,7 +141,7 @@ def grow_lattice(
             x, y = node.x + length * math.cos(node.theta), node.y + length * math.sin(node.theta)
             cost = node.cost + cost_of_move(move, abs(length) + abs(turn), node.move, lattice)
             key = key_of(x, y, heading, stride, lattice, len(headings))
-            slot = slot_of(key, nodes, table)
+            slot = slot_of_cell(key, nodes, table)
             if table[slot] != 0 and nodes[table[slot] - 1].cost <= cost + 1e-6:
                 continue
             distance = free_after(scene, lattice, node, length, turn)
@@ -177,7 +177,7 @@ def plant_root(
         return
     new = add_pose(nodes, search, -1, x, y, headings[heading], 0.0, distance, heading, NO_MOVE)
     nodes[new].key = key_of(x, y, heading, 1, lattice, len(headings))
-    table[slot_of(nodes[new].key, nodes, table)] = new + 1
+    table[slot_of_cell(nodes[new].key, nodes, table)] = new + 1
     search.queued = heap_push(keys, heap, search.queued, np.float32(0.0), new)
 
 
@@ -218,7 +218,7 @@ def key_of(x: float, y: float, heading: int, stride: int, lattice: Record, headi
 
 
 @inner_kernel
-def slot_of(key: int, nodes: Records, table: NDArray[np.int32]) -> int:
+def slot_of_cell(key: int, nodes: Records, table: NDArray[np.int32]) -> int:
     """Where a cell is in the table, or where it is to be: 0 there (open addressing)."""
     mask = len(table) - 1
     slot = ((key * 2654435761) >> 16) & mask
