@@ -66,7 +66,6 @@ def shortest_path(costs: NDArray[np.float32], columns: int, begin: int, end: int
         end: cell to end in.
     """
     count = len(costs)
-    rows = count // columns
     best, parents = np.empty(count, dtype=np.float32), np.empty(count, dtype=np.int32)
     for cell in range(count):
         best[cell] = math.inf
@@ -79,24 +78,19 @@ def shortest_path(costs: NDArray[np.float32], columns: int, begin: int, end: int
         size = heap_pop(keys, cells, size)
         if here == end:
             return walk_back(parents, begin, end)
-        row, column = here // columns, here % columns
-        if key > best[here] + math.hypot(goal_row - row, goal_column - column) + 1e-3:
+        if key > best[here] + math.hypot(goal_row - here // columns, goal_column - here % columns) + 1e-3:
             continue
         for step in MOVES:
-            i, j = column + step[0], row + step[1]
-            if i < 0 or j < 0 or i >= columns or j >= rows:
+            there, way = cell_beside(costs, columns, here, step)
+            if there < 0:
                 continue
-            there = j * columns + i
-            if costs[there] == np.inf:
-                continue
-            length = math.sqrt(float(step[0] * step[0] + step[1] * step[1]))
-            reached = best[here] + length * 0.5 * (costs[here] + costs[there])
+            reached = best[here] + way
             if reached < best[there] - 1e-4:
                 best[there] = reached
                 parents[there] = here
                 if size == len(keys):
                     keys, cells = doubled(keys), doubled(cells)
-                left = math.hypot(goal_row - j, goal_column - i)
+                left = math.hypot(goal_row - there // columns, goal_column - there % columns)
                 size = heap_push(keys, cells, size, np.float32(reached + left), there)
     return np.empty(0, dtype=np.int64)
 
@@ -116,7 +110,6 @@ def ways_to(costs: NDArray[np.float32], columns: int, end: int, begin: int, more
         Costs in terms of the side of a cell; infinite where they are not of interest, or there is no path.
     """
     count = len(costs)
-    rows = count // columns
     best = np.empty(count, dtype=np.float32)
     for cell in range(count):
         best[cell] = math.inf
@@ -133,22 +126,30 @@ def ways_to(costs: NDArray[np.float32], columns: int, end: int, begin: int, more
             break
         if here == begin:
             most = more * key
-        row, column = here // columns, here % columns
         for step in MOVES:
-            i, j = column + step[0], row + step[1]
-            if i < 0 or j < 0 or i >= columns or j >= rows:
+            there, way = cell_beside(costs, columns, here, step)
+            if there < 0:
                 continue
-            there = j * columns + i
-            if costs[there] == np.inf:
-                continue
-            length = math.sqrt(float(step[0] * step[0] + step[1] * step[1]))
-            reached = np.float32(key + length * 0.5 * (costs[here] + costs[there]))
+            reached = np.float32(key + way)
             if reached < best[there]:
                 best[there] = reached
                 if size == len(keys):
                     keys, cells = doubled(keys), doubled(cells)
                 size = heap_push(keys, cells, size, reached, there)
     return best
+
+
+@inner_kernel(forceinline=True)
+def cell_beside(costs: NDArray[np.float32], columns: int, here: int, step: tuple[int, int]) -> tuple[int, float]:
+    """The cell that one of the `MOVES` leads to, -1 where it is outside or blocked; and what the way there costs."""
+    i, j = here % columns + step[0], here // columns + step[1]
+    if i < 0 or j < 0 or i >= columns or j >= len(costs) // columns:
+        return -1, 0.0
+    there = j * columns + i
+    if costs[there] == np.inf:
+        return -1, 0.0
+    length = math.sqrt(float(step[0] * step[0] + step[1] * step[1]))
+    return there, length * 0.5 * (costs[here] + costs[there])
 
 
 @inner_kernel
