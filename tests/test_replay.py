@@ -20,7 +20,13 @@ from cbrrt_ompl.planners.search import Search
 from cbrrt_ompl.problem.obstacles import Bounds, Disc
 from cbrrt_ompl.problem.robot import Footprint, Gains, Limits, Robot
 from cbrrt_ompl.problem.settings import Goal, PlanningSettings, State
-from cbrrt_ompl.trajectory.replay import replay_edges, replay_path, trajectory_from_controls, tree_from_controls
+from cbrrt_ompl.trajectory.replay import (
+    fill_path,
+    replay_edges,
+    replay_path,
+    trajectory_from_controls,
+    tree_from_controls,
+)
 
 LAWS = {"open loop": OPEN_LOOP, "closed loop": CLOSED_LOOP, "steering": STEERING}
 START = np.array([0.2, -0.3, 0.4, 0.5, -0.1])
@@ -75,7 +81,8 @@ def test_a_path_is_driven_step_by_step(law: int, parts: list[tuple[float, float,
     by_hand = drive_by_hand(parts, law)
     assert np.array_equal(states, by_hand[0])
     assert np.array_equal(commands, by_hand[1])
-    python = plain(replay_path)(START, *arrays(parts), model_of(law).view(np.recarray))
+    python = np.empty_like(states), np.empty_like(commands)
+    plain(fill_path)(START, *arrays(parts), model_of(law).view(np.recarray), *python)
     assert states == pytest.approx(python[0], abs=1e-13)
     assert commands == pytest.approx(python[1], abs=1e-13)
 

@@ -8,7 +8,6 @@ import time
 import timeit
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from importlib import import_module
 from typing import Any
 
 LOOPS_OF_PLANNERS, LOOPS_OF_PLUGIN, LOOPS_OF_IMPROVEMENT = 7_000, 2_500, 5_000
@@ -34,7 +33,6 @@ def warm_up(planner: str | None, improves: bool = False) -> None:
         planner: its name; None for none.
         improves: whether trajectories are to be improved.
     """
-    _load_numba()
     from cbrrt_ompl import planning
 
     timer = threading.Timer(1.0, _tell_of_compilation, [planner, improves])
@@ -48,17 +46,6 @@ def warm_up(planner: str | None, improves: bool = False) -> None:
             planning.warm_up_improvement()
     finally:
         timer.cancel()
-
-
-def _load_numba() -> None:
-    """Load numba without ``scipy.linalg``, which takes a sixth of a start: it wants BLAS for convolutions alone."""
-    if "scipy.linalg" in sys.modules:
-        return
-    sys.modules["scipy.linalg"] = None  # type: ignore[assignment]  # so that an import of it fails
-    try:
-        import_module("numba.np.arraymath")
-    finally:
-        del sys.modules["scipy.linalg"]
 
 
 def _tell_of_compilation(planner: str | None, improves: bool) -> None:

@@ -7,14 +7,27 @@ from typing import Any
 
 from numba import njit
 
-from cbrrt_ompl.kernels.cache import drop_stale_kernels
+from cbrrt_ompl.kernels.cache import KernelCache, drop_stale_kernels
 from cbrrt_ompl.kernels.interrupts import hold_interrupts
 
 drop_stale_kernels()
 hold_interrupts()
 
-kernel: Any = partial(njit, cache=True, error_model="numpy")
-"""Decorator of a kernel that Python calls, too; 1 / 0 is infinite in it, as in NumPy."""
 
-inner_kernel: Any = partial(njit, cache=True, error_model="numpy", no_cpython_wrapper=True)
+def kernel(function: Any = None, **options: Any) -> Any:
+    """Decorator of a kernel that Python calls, too; 1 / 0 is infinite in it, as in NumPy.
+
+    Args:
+        function: to be compiled when it is first called; None where options are given.
+        options: what else numba's ``njit`` is told.
+    """
+    if function is None:
+        return partial(kernel, **options)
+    dispatcher = njit(error_model="numpy", **options)(function)
+    if hasattr(dispatcher, "enable_caching"):  # no plain function, as with NUMBA_DISABLE_JIT
+        dispatcher._cache = KernelCache(function)  # what enable_caching() does with numba's own kind
+    return dispatcher
+
+
+inner_kernel = partial(kernel, no_cpython_wrapper=True)
 """Decorator of a kernel that only kernels call: it compiles in four fifths of the time; a call from Python crashes."""

@@ -41,7 +41,7 @@ def compiled_beside(module: str, function: str, kernel: Any) -> Iterator[None]:
         kernel: one of them; where it has been compiled before, all have.
     """
     is_python = Path(sys.executable or "").name.startswith("python")
-    if os.environ.get(_IS_BESIDE) or not is_python or len(_running) + 1 >= available_cores() or not _is_missing(kernel):
+    if os.environ.get(_IS_BESIDE) or not is_python or len(_running) + 1 >= available_cores() or not is_missing(kernel):
         yield
         return
     try:
@@ -72,7 +72,7 @@ def _start(module: str, function: str) -> subprocess.Popen[bytes]:
     )
 
 
-def _is_missing(kernel: Any) -> bool:
+def is_missing(kernel: Any) -> bool:
     """Whether numba keeps kernels on the disk, and has not kept this one yet."""
     cache = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
     index = getattr(cache, "_index_path", None)

@@ -83,17 +83,30 @@ def extension_trajectories(node: State, sample: tuple[float, float], model: Reco
     ]
 
 
-@kernel
 def replay_path(
-    start: NDArray[np.float64], controls: NDArray[np.float64], steps: NDArray[np.int64], models: Records
+    start: NDArray[np.float64], controls: NDArray[np.float64], steps: NDArray[np.int64], model: Records
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """States at every step, shape (m + 1, 5), and the command that acts from each on, shape (m + 1, 2).
 
     The last state has no command of its own and repeats the one before it (its own velocities where there is none).
     """
+    rows = 1 + int(steps.sum())
+    states, commands = np.empty((rows, 5)), np.empty((rows, 2))
+    fill_path(start, controls, steps, model, states, commands)
+    return states, commands
+
+
+@kernel
+def fill_path(
+    start: NDArray[np.float64],
+    controls: NDArray[np.float64],
+    steps: NDArray[np.int64],
+    models: Records,
+    states: NDArray[np.float64],
+    commands: NDArray[np.float64],
+) -> None:
+    """Write what :func:`replay_path` returns; a kernel that makes arrays itself takes longer to load."""
     model = models[0]
-    total = steps.sum()
-    states, commands = np.empty((total + 1, 5)), np.empty((total + 1, 2))
     x, y, theta, v, omega = start[0], start[1], start[2], start[3], start[4]
     v_command, omega_command = v, omega
     row = 0
@@ -106,7 +119,6 @@ def replay_path(
             row += 1
     states[row, 0], states[row, 1], states[row, 2], states[row, 3], states[row, 4] = x, y, theta, v, omega
     commands[row, 0], commands[row, 1] = v_command, omega_command
-    return states, commands
 
 
 @kernel
