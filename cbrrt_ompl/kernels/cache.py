@@ -13,7 +13,7 @@ from numba.core.runtime import rtsys
 from numba.misc.appdirs import AppDirs
 
 
-class KernelCache(FunctionCache):  # type: ignore[misc]  # numba has no types
+class KernelCache(FunctionCache):
     """numba's cache of a kernel, which costs little before the kernel is called.
 
     numba looks for the files of a kernel when it is defined, though most are parts of others and never called; and it
@@ -32,7 +32,7 @@ class KernelCache(FunctionCache):  # type: ignore[misc]  # numba has no types
         return getattr(self, name)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The kernel for some types from the disk, None where there is none; then numba compiles, and prepares for it."""
+        """The kernel for some types, None where it is not on the disk: numba prepares for a compilation itself."""
         rtsys.initialize(target_context)
         with self._guard_against_spurious_io_errors():
             return self._load_overload(sig, target_context)
