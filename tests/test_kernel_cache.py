@@ -5,14 +5,25 @@ from __future__ import annotations
 import ast
 import os
 import re
+import subprocess
+import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from numba import config
-from numba.core.caching import _CacheLocator
+from numba.core.caching import FunctionCache, _CacheLocator
 from numba.misc.appdirs import AppDirs
 
+from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.kernels.cache import drop_stale_kernels
+
+PLAN = """
+import sys
+from cbrrt_ompl import load_scenario, plan
+assert plan(load_scenario("paper_case1"), "{planner}", seed=1, max_iterations={iterations}).solved
+print(*(name for name in ("numba.np.arraymath", "scipy.linalg", "cbrrt_ompl.optimise") if name in sys.modules))
+"""
 
 
 @pytest.fixture
@@ -57,6 +68,35 @@ def test_caches_elsewhere_are_looked_through_too(
 
 def test_a_folder_that_is_not_there_is_no_error(tmp_path: Path) -> None:
     drop_stale_kernels(tmp_path / "missing" / "package.zip")
+
+
+@pytest.mark.skipif(bool(vars(config)["DISABLE_JIT"]), reason="kernels are plain Python here")
+@pytest.mark.parametrize(
+    ("planner", "iterations", "loaded"),
+    [
+        ("cb-rrt-compiled", None, ""),
+        pytest.param("cb-rrt", None, "", marks=pytest.mark.needs_ompl),
+        ("cb-rrt-anytime", 50, "cbrrt_ompl.optimise"),
+    ],
+)
+def test_a_start_from_the_disk_loads_no_compiler(planner: str, iterations: int | None, loaded: str) -> None:
+    """What numba prepares for a compilation, SciPy's linear algebra with it, took a third of each start."""
+    command = [sys.executable, "-c", PLAN.format(planner=planner, iterations=iterations)]
+    subprocess.run(command, check=True, capture_output=True)  # leaves all kernels on the disk
+    found = subprocess.run(command, check=True, capture_output=True, text=True)
+    assert found.stdout.strip() == loaded
+
+
+@pytest.mark.skipif(bool(vars(config)["DISABLE_JIT"]), reason="kernels are plain Python here")
+def test_kernels_run_where_nothing_can_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: Any) -> None:
+        raise RuntimeError("cannot cache function 'double': no locator available")  # as numba says
+
+    def double(x: float) -> float:
+        return 2.0 * x
+
+    monkeypatch.setattr(FunctionCache, "__init__", refuse)
+    assert kernel(double)(1.5) == 3.0
 
 
 def test_only_kernels_call_a_kernel_without_a_way_in_from_python(repository: Path) -> None:

@@ -111,7 +111,8 @@ class Sight:
         corners = self._corners[rows]
         towards = np.arctan2(corners[:, 1] - y, corners[:, 0] - x)
         rays = _rays(np.concatenate([spans["start"], spans["start"] + spans["width"], towards]), spans["nearest_angle"])
-        distances, hits = first_hits(shapes, self._corners, spans, rays, x, y)
+        firsts = np.searchsorted(rays, spans["start"] - np.array([[0.0], [math.tau]]))
+        distances, hits = first_hits(shapes, self._corners, spans, rays, firsts, x, y)
         is_seen = np.zeros(self._obstacles, dtype=bool)
         is_seen[owner[hits[(hits >= 0) & (distances <= sensor_range)]]] = True
         return View(is_seen, rays, np.where(distances < sensor_range, hits, -1), np.minimum(distances, sensor_range))
@@ -200,7 +201,13 @@ def find_spans(shapes: Records, corners: NDArray[np.float64], x: float, y: float
 
 @kernel
 def first_hits(
-    shapes: Records, corners: NDArray[np.float64], spans: Records, rays: NDArray[np.float64], x: float, y: float
+    shapes: Records,
+    corners: NDArray[np.float64],
+    spans: Records,
+    rays: NDArray[np.float64],
+    firsts: NDArray[np.int64],
+    x: float,
+    y: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """The first shape that each ray hits, compiled.
 
@@ -209,6 +216,7 @@ def first_hits(
         corners: see :func:`find_spans`.
         spans: of the shapes, from the same place, shape (n,).
         rays: directions from -pi to pi, sorted, shape (k,) [rad].
+        firsts: the first ray after the beginning of each span, and after that less a turn, shape (2, n).
         x: position [m].
         y: position [m].
 
@@ -219,7 +227,7 @@ def first_hits(
     for i in range(len(shapes)):
         for turns in range(2):  # what goes on beyond pi begins again at -pi
             start = spans[i].start - turns * math.tau
-            for k in range(np.searchsorted(rays, start), len(rays)):
+            for k in range(firsts[turns, i], len(rays)):
                 if rays[k] > start + spans[i].width:
                     break
                 distance = _distance_along(shapes[i], corners, math.cos(rays[k]), math.sin(rays[k]), x, y)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 from numba import njit
+from numba.core.ccallback import CFunc
+from numba.core.sigutils import normalize_signature
 
 from cbrrt_ompl.kernels.cache import KernelCache, drop_stale_kernels
 from cbrrt_ompl.kernels.interrupts import hold_interrupts
@@ -31,3 +34,19 @@ def kernel(function: Any = None, **options: Any) -> Any:
 
 inner_kernel = partial(kernel, no_cpython_wrapper=True)
 """Decorator of a kernel that only kernels call: it compiles in four fifths of the time; a call from Python crashes."""
+
+
+def callback(signature: Any) -> Callable[[Callable[..., Any]], CFunc]:
+    """Decorator of a C function that others call by its address, compiled or read from the disk at once.
+
+    Args:
+        signature: its types, as for numba's ``cfunc``.
+    """
+
+    def compiled(function: Callable[..., Any]) -> CFunc:
+        found: Any = CFunc(function, normalize_signature(signature), {}, {})
+        found._cache = KernelCache(function)
+        found.compile()
+        return found
+
+    return compiled

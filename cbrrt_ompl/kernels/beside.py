@@ -41,7 +41,8 @@ def compiled_beside(module: str, function: str, kernel: Any) -> Iterator[None]:
         kernel: one of them; where it has been compiled before, all have.
     """
     is_python = Path(sys.executable or "").name.startswith("python")
-    if os.environ.get(_IS_BESIDE) or not is_python or len(_running) + 1 >= available_cores() or not is_missing(kernel):
+    is_of_use = is_python and _index_of(kernel) is not None and not is_kept(kernel)
+    if os.environ.get(_IS_BESIDE) or not is_of_use or len(_running) + 1 >= available_cores():
         yield
         return
     try:
@@ -72,8 +73,14 @@ def _start(module: str, function: str) -> subprocess.Popen[bytes]:
     )
 
 
-def is_missing(kernel: Any) -> bool:
-    """Whether numba keeps kernels on the disk, and has not kept this one yet."""
+def is_kept(kernel: Any) -> bool:
+    """Whether a kernel has been compiled, by this process or into a file that it finds, or need not be."""
+    index = _index_of(kernel)
+    return bool(getattr(kernel, "signatures", True)) or (index is not None and index.exists())
+
+
+def _index_of(kernel: Any) -> Path | None:
+    """The file that says what of a kernel is on the disk; None where numba keeps nothing there."""
     cache = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
     index = getattr(cache, "_index_path", None)
-    return index is not None and not kernel.signatures and not Path(index).exists()
+    return None if index is None else Path(index)

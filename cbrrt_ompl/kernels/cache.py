@@ -26,9 +26,12 @@ class KernelCache(FunctionCache):
 
     def __getattr__(self, name: str) -> Any:
         """What numba's cache consists of, made when something of it is first asked for."""
-        if "_cache_file" in self.__dict__ or name.startswith("__"):
+        if "_enabled" in self.__dict__ or name.startswith("__"):
             raise AttributeError(name)
-        super().__init__(self._function)
+        try:
+            super().__init__(self._function)
+        except RuntimeError:  # there is nowhere to write
+            self.__dict__.update(_cache_path=None, _cache_file=None, _enabled=False)
         return getattr(self, name)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:

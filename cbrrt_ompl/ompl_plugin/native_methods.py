@@ -11,14 +11,14 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import carray, cfunc, types
+from numba import carray, types
 
 from cbrrt_ompl.collision.clearance import clearance
 from cbrrt_ompl.collision.index import CELL
 from cbrrt_ompl.collision.pieces import CORNER, PIECE
 from cbrrt_ompl.collision.scene import FRAME, Scene
 from cbrrt_ompl.collision.world import CONTACT_BAND
-from cbrrt_ompl.kernels import kernel
+from cbrrt_ompl.kernels import callback, kernel
 from cbrrt_ompl.motion.model import GOAL_REGION, MODEL, advance
 from cbrrt_ompl.motion.records import Records, record_array
 from cbrrt_ompl.ompl_plugin.children import COUNTS, PARENT, add_child, slot_of_node
@@ -121,7 +121,7 @@ def enter_scene(record: Records, scene: Scene) -> None:
 # propagate
 
 
-@cfunc(types.void(types.int64, types.int64, types.int64, types.float64, types.int64), cache=True)
+@callback(types.void(types.int64, types.int64, types.int64, types.float64, types.int64))
 def propagate(this: int, state: int, control: int, duration: float, result: int) -> None:
     """``StatePropagator::propagate``: by the model, but through Python for a step that the model does not have."""
     record = carray(pointer(record_address(this)), 1, PROPAGATOR_RECORD)[0]
@@ -164,7 +164,7 @@ def is_within(bounds: int, first: float, second: float) -> bool:
     )
 
 
-@cfunc(types.uint8(types.int64, types.int64), cache=True)
+@callback(types.uint8(types.int64, types.int64))
 def is_valid(this: int, state: int) -> bool:
     """``StateValidityChecker::isValid``: by the exact distance, through Python where FCL has to decide."""
     record = carray(pointer(record_address(this)), 1, CHECKER_RECORD)[0]
@@ -217,7 +217,7 @@ GOAL_METHODS = {
 GOAL_RECORD = np.dtype([("region", np.int64)])
 
 
-@cfunc(types.float64(types.int64, types.int64), cache=True)
+@callback(types.float64(types.int64, types.int64))
 def distance_goal(this: int, state: int) -> float:
     """``GoalRegion::distanceGoal`` of a :class:`cbrrt_ompl.ompl_plugin.goals.PoseGoal`."""
     record = carray(pointer(record_address(this)), 1, GOAL_RECORD)[0]
@@ -276,13 +276,13 @@ def sample_to(this: int, control: int, source: int, dest: int) -> int:
     return found.steps
 
 
-@cfunc(types.uint32(types.int64, types.int64, types.int64, types.int64), cache=True)
+@callback(types.uint32(types.int64, types.int64, types.int64, types.int64))
 def sample_to_first(this: int, control: int, source: int, dest: int) -> int:
     """The method without the control of the node."""
     return sample_to(this, control, source, dest)
 
 
-@cfunc(types.uint32(types.int64, types.int64, types.int64, types.int64, types.int64), cache=True)
+@callback(types.uint32(types.int64, types.int64, types.int64, types.int64, types.int64))
 def sample_to_after(this: int, control: int, _: int, source: int, dest: int) -> int:
     """The method with the control of the node, which does not matter."""
     return sample_to(this, control, source, dest)

@@ -6,9 +6,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import carray, cfunc, types
+from numba import carray, types
 from numpy.typing import NDArray
 
+from cbrrt_ompl.kernels import callback
 from cbrrt_ompl.ompl_plugin.native_layout import (
     WORD,
     LayoutError,
@@ -134,7 +135,7 @@ def _reals(address: int, count: int) -> list[float]:
     return numbers
 
 
-@cfunc(types.float64(types.int64, types.int64, types.int64), cache=True)
+@callback(types.float64(types.int64, types.int64, types.int64))
 def distance(this: int, first: int, second: int) -> float:
     """``CompoundStateSpace::distance``: of the positions alone where the weights are 1, 0, 0, else libompl's."""
     record = carray(pointer(record_address(this)), 1, SPACE_RECORD)[0]

@@ -14,8 +14,9 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from numba import carray, cfunc, types
+from numba import carray, types
 
+from cbrrt_ompl.kernels import callback
 from cbrrt_ompl.motion.records import record_array
 from cbrrt_ompl.ompl_plugin.binding import ob
 from cbrrt_ompl.ompl_plugin.compiled_methods import use_compiled_methods
@@ -44,7 +45,7 @@ ROUNDS = np.dtype(
 """What the compiled function knows."""
 
 
-@cfunc(types.uint8(types.int64), cache=True)
+@callback(types.uint8(types.int64))
 def has_ended(held: int) -> int:
     """Whether rounds or time are over; the argument is the address of the address of a record of type `ROUNDS`."""
     rounds = carray(pointer(peek(held)), 1, ROUNDS)[0]

@@ -6,7 +6,7 @@ import math
 from functools import cache
 
 from cbrrt_ompl.collision.world import World
-from cbrrt_ompl.kernels.beside import compiled_beside, is_missing
+from cbrrt_ompl.kernels.beside import compiled_beside, is_kept
 from cbrrt_ompl.motion.model import OPEN_LOOP, make_model
 from cbrrt_ompl.motion.records import record_array
 from cbrrt_ompl.planners.growth import grow
@@ -28,7 +28,7 @@ def warm_up() -> None:
     world = World(Bounds((0.0, 0.0), (100.0, 100.0)))
     model = make_model(OPEN_LOOP, Robot(), Goal(90.0, 90.0, tolerance=1e-9), PlanningSettings())
     search = Search(model, world, Footprint.point(), [State(50.0, 50.0)], seed=0)
-    if is_missing(grow):
+    if not is_kept(grow):
         with compiled_beside(__name__, "warm_up_roll_out", grow):
             nearest(make_index(GRID, world.bounds, FIRST_CAPACITY), 50.0, 50.0, 0, math.inf, math.inf)
             search.tree()
