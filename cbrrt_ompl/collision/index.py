@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from cbrrt_ompl.collision.distances import point_piece
 from cbrrt_ompl.collision.pieces import Pieces
 from cbrrt_ompl.kernels import inner_kernel, kernel
-from cbrrt_ompl.motion.records import Record, Records, as_records, record_array
+from cbrrt_ompl.motion.records import Record, Records, as_records, copied_records, record_array
 
 CELL = np.dtype(
     [
@@ -113,7 +113,7 @@ def build_index(world: Pieces, frame: Record) -> tuple[Records, NDArray[np.int32
             distances,
         )
         if used > 0:
-            return cells[:used].copy(), listed[:count].copy(), 2**levels
+            return copied_records(cells[:used]), listed[:count].copy(), 2**levels
         room *= 4
 
 
@@ -162,7 +162,7 @@ def _build(
         waiting -= 1
         square = squares[waiting]
         level, column, row, x, y = square.level, square.column, square.row, square.x, square.y
-        side = side_of_all / 2.0**level
+        side = side_of_all / (1 << level)
         radius = math.sqrt(0.5) * side
         if x + radius < frame.x_min or x - radius > frame.x_max or y + radius < frame.y_min or y - radius > frame.y_max:
             continue
@@ -173,16 +173,19 @@ def _build(
         spread = 2.0 * radius + frame.outer - frame.inner + slack
         limit = square.clearance + radius + spread
         nearest = math.inf
-        found = start
+        found = best = start
         for k in range(first, start):
             if distances[k] - radius <= limit:
                 distance = point_piece(x, y, pieces[candidates[k]], corners)
                 if distance < nearest:
-                    nearest = distance
+                    nearest, best = distance, found
                     limit = min(limit, nearest + spread)
                 if distance <= limit:
                     candidates[found], distances[found] = candidates[k], distance
                     found += 1
+        if best > start:  # to the front, where it soon rules out others in the parts of the square
+            candidates[start], candidates[best] = candidates[best], candidates[start]
+            distances[start], distances[best] = distances[best], distances[start]
         if nearest + radius + slack < frame.inner:  # all of the square is in collision with the nearest
             limit = nearest
         end = start

@@ -11,7 +11,7 @@ import shapely
 from numpy.typing import NDArray
 
 from cbrrt_ompl.collision.convex import convex_parts
-from cbrrt_ompl.motion.records import Records
+from cbrrt_ompl.motion.records import Records, put_records
 from cbrrt_ompl.problem.obstacles import Box, Disc, Obstacle, OrientedBox, Polygon
 from cbrrt_ompl.problem.robot import Footprint
 
@@ -58,16 +58,16 @@ class Pieces(NamedTuple):
 
 def join(parts: Iterable[Pieces]) -> Pieces:
     """Several sets of pieces as one."""
-    pieces, corners, first = [], [], 0
+    parts = list(parts)
+    pieces = np.empty(sum(len(part.pieces) for part in parts), dtype=PIECE)
+    corners = np.empty(sum(len(part.corners) for part in parts), dtype=CORNER)
+    row = first = 0
     for part in parts:
-        moved = part.pieces.copy()
-        moved["first"] += first
-        pieces.append(moved)
-        corners.append(part.corners)
-        first += len(part.corners)
-    return Pieces(
-        np.concatenate([np.empty(0, dtype=PIECE), *pieces]), np.concatenate([np.empty(0, dtype=CORNER), *corners])
-    )
+        put_records(pieces[row:], part.pieces)
+        pieces["first"][row : row + len(part.pieces)] += first
+        put_records(corners[first:], part.corners)
+        row, first = row + len(part.pieces), first + len(part.corners)
+    return Pieces(pieces, corners)
 
 
 def obstacle_pieces(obstacles: Sequence[Obstacle]) -> Pieces:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cbrrt_ompl.kernels import inner_kernel, kernel
-from cbrrt_ompl.motion.records import Records, record_array
+from cbrrt_ompl.motion.records import Records, put_records, record_array
 from cbrrt_ompl.planners.bits import highest_bit, lowest_bit
 from cbrrt_ompl.problem.obstacles import Bounds
 from cbrrt_ompl.problem.settings import NEAREST_NEIGHBOUR
@@ -116,7 +116,7 @@ def enlarged(index: Index, bounds: Bounds, nodes: int) -> Index:
         nodes: how many of its places are in use.
     """
     larger = make_index(index.kind, bounds, 2 * len(index.places), int(index.state["depth"][0]))
-    larger.places[:nodes] = index.places[:nodes]
+    put_records(larger.places, index.places[:nodes])
     larger.state[:] = index.state
     if index.kind == GRID:
         _enter_again(larger, nodes)

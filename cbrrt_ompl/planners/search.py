@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.motion.laws import raise_errors
 from cbrrt_ompl.motion.model import make_model
-from cbrrt_ompl.motion.records import Records, record_array
+from cbrrt_ompl.motion.records import Records, put_records, record_array
 from cbrrt_ompl.planners.first_plan import FirstPlan
 from cbrrt_ompl.planners.growth import (
     BOUNDED_DRAWS,
@@ -172,7 +172,7 @@ class Search:
     def _make_room(self) -> None:
         """Double the arrays."""
         larger = record_array(2 * len(self._tree), NODE)
-        larger[: self.nodes] = self._tree[: self.nodes]
+        put_records(larger, self._tree[: self.nodes])
         self._tree = larger
         self._index = enlarged(self._index, self._bounds, self.nodes)
 
