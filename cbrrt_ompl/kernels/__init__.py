@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from numba import njit
+from numba import config, njit
 from numba.core.ccallback import CFunc
 from numba.core.sigutils import normalize_signature
 
@@ -39,6 +39,8 @@ inner_kernel = partial(kernel, no_cpython_wrapper=True)
 def callback(signature: Any) -> Callable[[Callable[..., Any]], CFunc]:
     """Decorator of a C function that others call by its address, compiled or read from the disk at once.
 
+    With ``NUMBA_DISABLE_JIT`` it has none: the kernels that it calls are plain Python then.
+
     Args:
         signature: its types, as for numba's ``cfunc``.
     """
@@ -46,7 +48,8 @@ def callback(signature: Any) -> Callable[[Callable[..., Any]], CFunc]:
     def compiled(function: Callable[..., Any]) -> CFunc:
         found: Any = CFunc(function, normalize_signature(signature), {}, {})
         found._cache = KernelCache(function)
-        found.compile()
+        if not vars(config)["DISABLE_JIT"]:
+            found.compile()
         return found
 
     return compiled

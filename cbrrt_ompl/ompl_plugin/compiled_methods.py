@@ -1,7 +1,8 @@
 """The switch of the compiled methods behind OMPL's virtual calls, and what happens where they cannot be used.
 
 They are used unless somebody says otherwise, by an argument or by ``CBRRT_OMPL_COMPILED_METHODS=0`` in the environment,
-or this build of OMPL fails the check before their first use in a process. The Python methods then do the same, slower.
+numba is switched off, or this build of OMPL fails the check before their first use in a process.
+The Python methods then do the same, slower.
 """
 
 from __future__ import annotations
@@ -10,6 +11,8 @@ import logging
 import os
 import threading
 from functools import cache
+
+from numba import config
 
 VARIABLE = "CBRRT_OMPL_COMPILED_METHODS"
 """Variable of the environment that switches them off."""
@@ -30,6 +33,7 @@ def use_compiled_methods(wanted: bool | None = None) -> bool:
     """
     if wanted is None:
         wanted = os.environ.get(VARIABLE, "").strip().lower() not in OFF
+    wanted = wanted and not vars(config)["DISABLE_JIT"]
     return wanted and (getattr(_checking, "is_on", False) or compiled_methods_work())
 
 

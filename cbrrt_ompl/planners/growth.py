@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from cbrrt_ompl.collision.scene import Scene
 from cbrrt_ompl.kernels import kernel
 from cbrrt_ompl.motion.manoeuvres import is_manoeuvre
-from cbrrt_ompl.motion.model import CLOSED_LOOP, in_goal
+from cbrrt_ompl.motion.model import CLOSED_LOOP, STEERING, in_goal
 from cbrrt_ompl.motion.records import Record, Records
 from cbrrt_ompl.planners.extension import EXTENDED, NO_CHILD, REFUSED, UNTRIED, Extension, extend
 from cbrrt_ompl.planners.nearest import KD_TREE, Index, insert, leave_out, nearest
@@ -250,6 +250,8 @@ def grow(
             new.control[0], new.control[1], new.control[2] = extension.control
             new.steps = extension.steps
             add_node(tree, index, number, parent)
+            if model.law != STEERING:  # which drives by several rates and takes one
+                new.margin, new.any_heading = steps.margin, steps.any_heading
             search.nodes += 1
             if is_manoeuvre(extension.control) or in_goal(model.goal, new.x, new.y, new.theta, new.v, new.omega):
                 return GROW_REACHED
