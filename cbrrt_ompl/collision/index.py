@@ -183,7 +183,7 @@ def _build(
                 if distance <= limit:
                     candidates[found], distances[found] = candidates[k], distance
                     found += 1
-        if best > start:  # to the front, where it soon rules out others in the parts of the square
+        if start < best < found:  # to the front, where it soon rules out others in the parts of the square
             candidates[start], candidates[best] = candidates[best], candidates[start]
             distances[start], distances[best] = distances[best], distances[start]
         if nearest + radius + slack < frame.inner:  # all of the square is in collision with the nearest
