@@ -34,7 +34,7 @@ from cbrrt_ompl.collision.world import World
 from cbrrt_ompl.motion.model import OPEN_LOOP, ROOM, STEERING
 from cbrrt_ompl.motion.records import Records
 from cbrrt_ompl.planners.extension import BLOCKED, EXTENDED
-from cbrrt_ompl.planners.roll_out import MOTION_BLOCKED
+from cbrrt_ompl.planners.roll_out import MOTION_BLOCKED, margin_at
 from cbrrt_ompl.planners.search import Search
 from cbrrt_ompl.planning import plan
 from cbrrt_ompl.problem.obstacles import Bounds, Box, OrientedBox
@@ -105,6 +105,22 @@ def test_no_corner_turns_into_a_wall_beside_the_start(law: int) -> None:
     assert not world.collides(square, (0.0, 0.0, 0.0))
     steps, outcome, _ = roll_out_free(world.scene(square), State(0.0, 0.0), (0.0, 0.5, 0.0), model_of(law))
     assert (steps, outcome) == (0, MOTION_BLOCKED)
+
+
+@pytest.mark.parametrize("footprint", FOOTPRINTS.values(), ids=FOOTPRINTS)
+@pytest.mark.parametrize("settings", [{}, {"brake_safe": True}, {"cut_extension": "keep"}], ids=str)
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_nodes_know_their_own_margin_or_none(footprint: Footprint, law: int, settings: dict[str, object]) -> None:
+    """A motion leaves it to the node at its end, where it has looked there."""
+    world = crowded_world()
+    scene, model = world.scene(footprint), model_of(law, horizon=0.7, **settings)
+    search = Search(model, world, footprint, free_nodes(world, footprint, 20, seed=1), seed=2)
+    search.run(lambda _: False, 1000)
+    known = search._tree[: search.nodes][search._tree["margin"][: search.nodes] >= 0.0]
+    assert len(known) > 10
+    for node in known:
+        margin = margin_at(node["x"], node["y"], node["theta"], scene, model["room"][0])
+        assert (node["margin"], node["any_heading"]) == margin
 
 
 def free_steps(scene: Scene, states: NDArray[np.float64], model: Records) -> int:
