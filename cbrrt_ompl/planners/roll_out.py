@@ -352,7 +352,6 @@ def roll_out(
             control[2], math.hypot(model.goal.x - node[0], model.goal.y - node[1]), model.limits, model.dt
         )
     steps.x[0], steps.y[0], steps.theta[0], steps.v[0], steps.omega[0] = node
-    steps.margin = -1.0
     driven = 0
     size = SHORT_BLOCK if margin < NEAR else BLOCK
     while left > 0:
@@ -392,10 +391,9 @@ def roll_out_brake_safe(
     Robots whose velocities jump stop on the spot, so that nothing is cut.
     """
     driven, outcome, end = roll_out(node, control, margin, any_heading, scene, model, steps)
-    if model.brake_safe:
-        steps.margin = -1.0  # what follows may look elsewhere, or cut the drive
     if not model.brake_safe or model.jumps or (outcome == MOTION_BLOCKED and not model.keep_cut):
         return driven, outcome, end
+    steps.margin = -1.0  # what follows may look elsewhere, or cut the drive
     unchecked = driven
     if not model.keep_cut:  # the end first: it is the likeliest to be refused
         unchecked -= 1
